@@ -374,3 +374,54 @@ def test_a_window_runs_over_a_recording_from_end_to_end(run, tmp_path):
     times = data["time_s"]
     assert len(times) == 21
     assert times[-1] - times[0] == pytest.approx(0.2)
+
+
+def test_a_pair_is_shown_with_its_product(run):
+    status, said, _ = run("window show pair-1-5")
+    assert status == 0
+    assert "pair: its level of F_1 is that of the product with F_2/30 - F_0/6\n" in said
+    lines = [line.split() for line in said.splitlines()]
+    assert ["5", "5", "2.115e-06", "2.541e-06", "-", "-"] in [line[:6] for line in lines]
+    assert ["6", "4"] in [line[:2] for line in lines if len(line) == 11 and "-" not in line]
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ("--form pair --band 1", "--form pair needs --u-taps"),
+        ("--form pair --u-taps 3 --band 1", "--form pair needs --v-taps"),
+        ("--u-taps 3 --v-taps 3 --band 1", "--u-taps needs --form pair"),
+        ("--form pair --u-taps 3 --v-taps 3 --ahead 3 --band 1", "--ahead needs --form legendre"),
+        (
+            "--form pair --u-taps 8 --v-taps 30 --band 1",
+            "--u-taps 8 and --v-taps 30 make 61 samples; at most 41 are allowed",
+        ),
+        (
+            "--form pair --u-taps 4 --v-taps 0 --band 1",
+            "v-taps is 0; a whole number at least 1 is needed",
+        ),
+        ("--form two --band 1", "form 'two' is not known; allowed: legendre, pair"),
+    ],
+)
+def test_options_that_are_no_pair_are_refused(options, message, run):
+    status, _, warned = run(f"window design {options}")
+    assert status == 2 and message in warned
+
+
+def test_a_pair_is_designed_by_the_command(run, tmp_path):
+    command = "window design --form pair --samples 2 --u-taps 3 --v-taps 3 --coefficients 2 --band 1"
+    for name in ("first", "second"):
+        assert run(f"{command} --out {name}.toml")[0] == 0
+    first, second = ((tmp_path / f"{name}.toml").read_text().splitlines() for name in ("first", "second"))
+    assert first[1:] == second[1:] and first[0].endswith(
+        f"{command.removeprefix('window ')} --out first.toml"
+    )
+    window = windows.read("first.toml")
+    assert (window.form, window.increments, window.previous, window.ahead) == ("pair", 2, 2, 2)
+
+
+def test_the_option_window_takes_a_name(run):
+    status, said, _ = run("derive euler --window pair-1-5-exact")
+    assert status == 0 and said == run("derive euler --method pair-1-5-exact")[1]
+    status, _, warned = run("derive euler --window pair-1-6")
+    assert status == 2 and "window 'pair-1-6' is not known (did you mean pair-1-5" in warned

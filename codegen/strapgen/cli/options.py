@@ -218,8 +218,8 @@ class MethodOptions:
         Path | None,
         option(
             "--window",
-            metavar="FILE",
-            help="TOML file with the filters of your own window, in place of --method; window design writes one.",
+            metavar="NAME|FILE",
+            help="A window as pair-1-8, or a TOML file with your own, in place of --method; window design writes one.",
         ),
     ] = None
     coning: Annotated[
@@ -295,7 +295,7 @@ class MethodOptions:
         method: AnyMethod | None = self.method
         readers: dict[Callable[[Path], AnyMethod], Path | None] = {
             tableaux.read: self.tableau,
-            windows.read: self.window,
+            windows.named_or_read: self.window,
             shaped_coning.read: self.coning,
         }
         for read, path in readers.items():

@@ -47,7 +47,9 @@ def window_image(result: WindowResult, path: str | Path) -> bytes:
         axes.set_yscale("log")
         axes.set_ylim(_LOWEST, 10.0)
         axes.set_xlim(0.0, 0.5)
-        axes.set_title(f"F_{m}", loc="left", fontsize=10)
+        axes.set_title(
+            f"F_{m}" if window.partner(m) is None else "F_1 (F_2/30 - F_0/6)", loc="left", fontsize=10
+        )
         axes.set_ylabel("error by rate times interval")
         figures.style(axes)
     for axes in grid.flat[len(degrees) :]:

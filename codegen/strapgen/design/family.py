@@ -16,7 +16,7 @@ from typing import Any
 
 from strapgen.catalogue.methods.coefficient_files import slug
 from strapgen.catalogue.methods.window import GyroResponse, Taps, Window, sibling_name, sibling_title
-from strapgen.catalogue.methods.windows import one_sided_sizes, start_sizes, stored_sizes
+from strapgen.catalogue.methods.windows import of_sibling, one_sided_sizes, start_sizes, stored_sizes
 from strapgen.design.filters import exchange, mean_square, responses
 from strapgen.design.filters.filter_taps import Shape, Unknowns, rounded
 from strapgen.ir import checks
@@ -26,6 +26,8 @@ from strapgen.storage import cache
 
 #: Default of the noise for which one-sided filters are designed.
 ONE_SIDED_NOISE = Fraction(3, 10000)
+#: Most samples of a step of a pair.
+MOST_PAIR_INCREMENTS = 3
 
 
 @dataclass(frozen=True)
@@ -56,11 +58,14 @@ class FamilyBrief:
         By default it says the samples and the band.
     increments : int, optional
         Samples of a step (N); several take the exact rotation.
+    taps : (int, int), optional
+        Of a pair, the numbers of free taps on each side of the middle of the step, of F_1 and of F_2; `pair` has the
+        samples that go with them. One-sided filters, up to `degree`, are those of a window.
 
     Raises
     ------
     InputError
-        If the rotation of a step of several samples is not exact.
+        If the rotation of a step of several samples is not exact, or the numbers do not go with a pair.
 
     Examples
     --------
@@ -83,15 +88,32 @@ class FamilyBrief:
     title: str = ""
     start_noise: Fraction = Fraction(0)
     increments: int = 1
+    taps: tuple[int, int] | None = None
 
     __repr__ = short_repr
 
     def __post_init__(self) -> None:
         """Refuse more conditions than samples, and a rotation that is not good enough for steps of several samples."""
         checks.count("conditions", self.conditions, largest=self.previous + self.increments + self.ahead)
-        if self.increments > 1 and self.rotation != "exact":
+        if self.taps is not None:
+            self._check_pair(self.taps)
+        elif self.increments > 1 and self.rotation != "exact":
             raise InputError(
                 f"rotation is {self.rotation!r}; steps of {self.increments} samples take the exact one"
+            )
+
+    def _check_pair(self, taps: tuple[int, int]) -> None:
+        checks.count("increments", self.increments, largest=MOST_PAIR_INCREMENTS)
+        if self.gyro is not None:
+            raise InputError("a pair goes with no gyro; its increments are integrals of the rate")
+        # The sample in the middle of an odd number has a tap of F_2 itself.
+        least = self.conditions // 2, (self.conditions + 1) // 2 - self.increments % 2
+        for filter, number, needed in zip("uv", taps, least, strict=True):
+            checks.count(f"{filter}-taps", number, smallest=needed)
+        side = pair_side(taps, self.increments)
+        if (self.previous, self.ahead) != (side, side):
+            raise InputError(
+                f"a pair of {taps[0]} and {taps[1]} taps has {side} samples on each side of its step"
             )
 
     @property
@@ -107,7 +129,11 @@ class FamilyBrief:
     @property
     def full_title(self) -> str:
         """The title, by default from the samples, the band, the gyro and the noise."""
-        parts = [f"Window {self.increments}+{self.previous}+{self.ahead} to {float(self.band):g} rad"]
+        samples = f"{self.increments}+{self.previous}+{self.ahead}"
+        kind = f"Window {samples}"
+        if self.taps is not None:
+            kind = f"Pair {samples} of {self.taps[0]}/{self.taps[1]} taps"
+        parts = [f"{kind} to {float(self.band):g} rad"]
         if self.gyro is not None:
             parts.append(f"gyro {float(self.gyro.bandwidth_hz):g} Hz")
         if self.noise:
@@ -115,6 +141,15 @@ class FamilyBrief:
         if self.spectrum is not None:
             parts.append("for a spectrum")
         return self.title or ", ".join(parts)
+
+
+def pair_side(taps: tuple[int, int], increments: int) -> int:
+    """Return the samples on each side of the step of a pair, from its taps on each side of the middle of the step.
+
+    >>> pair_side((8, 6), 1), pair_side((8, 7), 2)
+    (8, 7)
+    """
+    return max(taps) - increments // 2
 
 
 def design(
@@ -163,6 +198,7 @@ def design(
         brief.noise,
         brief.rotation,
         brief.terms,
+        form="legendre" if brief.taps is None else "pair",
     )
     windows = {}
     for size in one_sided_sizes(brief.previous, brief.ahead):
@@ -191,7 +227,7 @@ def _sibling(committed: Window, size: tuple[int, int], filters: tuple[Taps, ...]
     previous, ahead = size
     return replace(
         committed,
-        sibling=True,
+        **of_sibling(committed),
         name=sibling_name(committed.name, committed.previous, committed.ahead, previous, ahead),
         title=sibling_title(committed.title, previous, ahead),
         previous=previous,
@@ -212,21 +248,43 @@ def _designed(brief: FamilyBrief, size: tuple[int, int], one_sided_noise: Fracti
     """Design the filters with some samples before and ahead of the step."""
     shape = Shape(*size, brief.conditions, brief.gyro, brief.increments)
     degrees = range(0 if brief.gyro else 1, brief.degree + 1)
-    unknowns = [Unknowns(shape, m) for m in degrees]
     one_sided = size != (brief.previous, brief.ahead)
-    taps: Sequence[Sequence[Any]]
-    if one_sided or brief.objective == "mean square":
-        noise = one_sided_noise if one_sided else brief.noise
-        taps = mean_square.mean_square_filters(shape, degrees, brief.band, noise, brief.spectrum)
-    elif shape.symmetric:
-        taps = [exchange.minimax_filter(each, brief.band).taps for each in unknowns]
+    rows: tuple[Taps, ...]
+    if brief.taps is not None and not one_sided:
+        rows = _pair(brief, brief.taps)
     else:
-        taps = mean_square.lawson_filters(shape, degrees, brief.band)
-    rows = tuple(rounded(each, row) for each, row in zip(unknowns, taps, strict=True))
+        unknowns = [Unknowns(shape, m) for m in degrees]
+        taps: Sequence[Sequence[Any]]
+        if one_sided or brief.objective == "mean square":
+            noise = one_sided_noise if one_sided else brief.noise
+            taps = mean_square.mean_square_filters(shape, degrees, brief.band, noise, brief.spectrum)
+        elif shape.symmetric:
+            taps = [exchange.minimax_filter(each, brief.band).taps for each in unknowns]
+        else:
+            taps = mean_square.lawson_filters(shape, degrees, brief.band)
+        rows = tuple(rounded(each, row) for each, row in zip(unknowns, taps, strict=True))
     if brief.gyro is not None:
         return rows
     step = range(shape.previous, shape.previous + shape.increments)
     return (tuple(Fraction(place in step) for place in range(shape.samples)), *rows)
+
+
+def _pair(brief: FamilyBrief, taps: tuple[int, int]) -> tuple[Taps, Taps]:
+    """Return F_1 and F_2 of a pair: F_2 is designed as that of a window, and F_1 for its rationals."""
+    second: Taps | None = None
+    rows = []
+    for m, number in ((2, taps[1]), (1, taps[0])):
+        side = pair_side((number, number), brief.increments)
+        unknowns = Unknowns(Shape(side, side, brief.conditions, None, brief.increments), m)
+        if brief.objective == "minimax":
+            best: Sequence[Any] = exchange.minimax_filter(unknowns, brief.band, second=second).taps
+        else:
+            facts = unknowns.shape, [m], brief.band, brief.noise, brief.spectrum
+            (best,) = mean_square.mean_square_filters(*facts, second)
+        second = rounded(unknowns, best)
+        zeros = (Fraction(0),) * (brief.previous - side)
+        rows.append((*zeros, *second, *zeros))
+    return rows[1], rows[0]
 
 
 def written(family: Window, command: str) -> str:
@@ -244,7 +302,8 @@ def written(family: Window, command: str) -> str:
     )
     lines = [
         f"# Designed by: {command}",
-        f"# Levels of F_{0 if family.gyro else 1} to F_{family.degree}: {levels}",
+        f"# Levels of F_{0 if family.gyro else 1} to F_{family.degree}: {levels}"
+        + ("; that of F_1 is of its product with F_2/30 - F_0/6" if family.form == "pair" else ""),
         *(f"{key} = {json.dumps(value, ensure_ascii=False)}" for key, value in _file_head(family).items()),
     ]
     lines += _filter_lines(family.filters)
@@ -274,6 +333,7 @@ def _file_head(family: Window) -> dict[str, str | int]:
         "noise": number(family.noise),
         "rotation": family.rotation,
     }
+    head |= {"form": family.form} if family.form != "legendre" else {}
     return head | ({"terms": family.terms} if family.rotation == "exact" else {})
 
 

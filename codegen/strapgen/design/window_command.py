@@ -22,10 +22,8 @@ from strapgen.cli.progress import waiting
 from strapgen.cli.values import NotNegative, Positive, names
 from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError
-from strapgen.storage import streams
 
 if TYPE_CHECKING:
-    from strapgen.catalogue.methods.window import Window
     from strapgen.design.family import FamilyBrief
     from strapgen.ir.sources import Sources
 
@@ -39,19 +37,6 @@ WindowArgument = Annotated[
         words="strapgen.catalogue.methods.windows:WINDOWS",
     ),
 ]
-
-
-def window_of(argument: str) -> Window:
-    """Return a window, its conditions verified; see `streams.names_file` for a file."""
-    from strapgen.catalogue.methods import windows
-
-    if streams.names_file(argument):
-        return windows.read(argument)
-    if argument not in windows.WINDOWS:
-        checks.choice("window", argument, windows.WINDOW_TITLES, "their one-sided filters, as window-14-0")
-    window = windows.WINDOWS[argument]
-    windows.verify(window)
-    return window
 
 
 _Text = str | None
@@ -70,15 +55,48 @@ class WindowSize:
 
     panel: ClassVar[str] = "Window"
     rules: ClassVar[tuple[Rule, ...]] = (
-        OneOf("--previous", needed="--previous is needed, a number of samples"),
-        OneOf("--ahead", needed="--ahead is needed, a number of samples"),
+        *(Needs("--form=pair", taps) for taps in ("--u-taps", "--v-taps")),
+        Needs("--u-taps --v-taps", "--form=pair"),
+        Needs("--previous --ahead", "--form=legendre"),
+        OneOf("--previous --u-taps", needed="--previous is needed, a number of samples"),
+        OneOf("--ahead --v-taps", needed="--ahead is needed, a number of samples"),
         Needs("--series-terms", "--rotation=exact"),
     )
 
+    form: Annotated[
+        str,
+        option(
+            "--form",
+            metavar="NAME",
+            help="What the filters are: legendre, each for its coefficient of the rate, or pair, two whose product is "
+            "that of coning, with those of legendre for the attitude of now.",
+            read=names("strapgen.catalogue.methods.windows:FORMS"),
+        ),
+    ] = "legendre"
     samples: Annotated[
         int,
-        option("--samples", metavar="N", help="Number of samples in a step; several take --rotation exact."),
+        option(
+            "--samples",
+            metavar="N",
+            help="Number of samples in a step; several take --rotation exact, or up to 3 --form pair.",
+        ),
     ] = 1
+    u_taps: Annotated[
+        int | None,
+        option(
+            "--u-taps",
+            metavar="N",
+            help="Number of free taps on each side of the middle of the step of the first filter of a pair.",
+        ),
+    ] = None
+    v_taps: Annotated[
+        int | None,
+        option(
+            "--v-taps",
+            metavar="N",
+            help="The same of the second filter; for odd N it has one in the middle too.",
+        ),
+    ] = None
     previous: Annotated[
         int | None,
         option(*("--previous", "--kept"), metavar="N", help="Number of samples from before the step."),
@@ -183,6 +201,8 @@ def design(
     now. Each is exact for polynomial rates, and the best one over the band. A second design gives the same file.
 
     Example: strapgen window design --previous 7 --ahead 7 --band 1.3 --out out/window.toml
+
+    Example: strapgen window design --form pair --u-taps 8 --v-taps 6 --band 1.3 --out out/pair.toml
     """
     output.check(band.spectrum)
     brief = _brief(size, band, name)
@@ -207,19 +227,22 @@ def design(
 def _brief(size: WindowSize, band: Band, name: str | None) -> FamilyBrief:
     """Return the requirements from the options."""
     from strapgen.catalogue.methods import windows
-    from strapgen.design.family import FamilyBrief
+    from strapgen.design.family import FamilyBrief, pair_side
 
-    assert size.previous is not None and size.ahead is not None, "they are needed"
-    previous, ahead = (
-        checks.count(stated, value, smallest=0, largest=windows.MOST_SAMPLES - 1)
-        for stated, value in (("--previous", size.previous), ("--ahead", size.ahead))
-    )
     increments = checks.count("--samples", size.samples, largest=windows.MOST_SAMPLES)
+    pair = size.form == "pair"
+    stated = {"--u-taps": size.u_taps, "--v-taps": size.v_taps}
+    stated = stated if pair else {"--previous": size.previous, "--ahead": size.ahead}
+    (one, first), (other, second) = (
+        (name, checks.count(name, value, smallest=0, largest=windows.MOST_SAMPLES - 1))
+        for name, value in stated.items()
+    )
+    previous, ahead = [max(0, pair_side((first, second), increments))] * 2 if pair else (first, second)
     samples = previous + increments + ahead
     if samples > windows.MOST_SAMPLES:
         step = "" if increments == 1 else f" with --samples {increments}"
         raise InputError(
-            f"--previous {previous} and --ahead {ahead}{step} make {samples} samples; "
+            f"{one} {first} and {other} {second}{step} make {samples} samples; "
             f"at most {windows.MOST_SAMPLES} are allowed"
         )
     radians, gyro = band.radians(), band.gyro()
@@ -242,6 +265,7 @@ def _brief(size: WindowSize, band: Band, name: str | None) -> FamilyBrief:
         _title(name),
         Fraction(band.start_noise),
         increments,
+        (first, second) if pair else None,
     )
 
 
@@ -287,9 +311,10 @@ def show_window(
     Example: strapgen window show window-7-7
     """
     output.check(window)
+    from strapgen.catalogue.methods import windows
     from strapgen.design.window_report import WindowResult
 
-    family = window_of(window)
+    family = windows.named_or_read(window)
     with waiting("evaluating the filters"):
         result = WindowResult.of(family)
     output.show(result)
@@ -359,9 +384,11 @@ def generated(
     name: str | None,
 ) -> Sources:
     """Return the sources for the options."""
+    from strapgen.catalogue.methods import windows
     from strapgen.design.commit_late import commit_late_sources
 
     rated = sample_hz if (fixed.max_rate_deg_s, fixed.lsb) != (None, None) else None
     settings = replace(fixed, sample_hz=rated).settings(1)
     with waiting("generating"):
-        return commit_late_sources.sources(window_of(window), algorithm, target, sample_hz, name, settings)
+        family = windows.named_or_read(window)
+        return commit_late_sources.sources(family, algorithm, target, sample_hz, name, settings)

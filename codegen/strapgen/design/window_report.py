@@ -94,6 +94,8 @@ class WindowResult(Result):
     gyro: dict[str, float] | None
     #: "fourth" for the rotation vector to fourth order, or "exact" for a power series of the quaternion
     rotation: str
+    #: "legendre" for a filter of each coefficient, or "pair" for two whose product is that of coning
+    form: str
     #: Terms of that power series
     terms: int | None
     side: WindowSide = field(metadata=entry(spread=True))
@@ -105,7 +107,7 @@ class WindowResult(Result):
     def of(window: Window) -> WindowResult:
         """Return a family, or one-sided filters alone."""
         gyro = window.gyro
-        same = ("name", "title", "source", "increments", "conditions", "rotation")
+        same = ("name", "title", "source", "increments", "conditions", "rotation", "form")
         return WindowResult(
             window=window,
             **{name: getattr(window, name) for name in same},
@@ -142,6 +144,7 @@ class WindowResult(Result):
             else f"power series of the quaternion, {counted(window.terms, 'term')}",
             "symmetric in time": "yes" if window.parity else "no",
         }
+        pair = self.form == "pair"
         first = 0 if window.gyro else 1
         return "\n".join(
             [
@@ -155,6 +158,7 @@ class WindowResult(Result):
                 "level: largest error of a Legendre coefficient over the band, by the rate times the sampling interval",
                 "noise gain: standard deviation of the coefficient by that of white noise of the increments",
                 "gain of F_0: largest response to a rate, up to half the sampling rate",
+                *(["pair: its level of F_1 is that of the product with F_2/30 - F_0/6"] if pair else []),
                 *(
                     [
                         "start: for the first intervals of a recording, in place of those with as many samples before"
@@ -186,7 +190,8 @@ def _side_table(result: WindowResult, first: int) -> TextTable:
     """Return a row for the filters of each number of samples ahead: levels and gains."""
     sides = [(result.side, ""), *((one.side, "") for one in result.one_sided)]
     sides += [(one.side, "start") for one in result.start]
-    degrees = [row.coefficient for row in result.side.filters[first:]]
+    most = max(len(side.filters) for side, _ in sides)
+    degrees = range(first, most)
     columns = [
         *([Column("of", "<")] if result.start else []),
         Column("before"),
@@ -200,11 +205,15 @@ def _side_table(result: WindowResult, first: int) -> TextTable:
             *([use] if result.start else []),
             side.previous,
             side.ahead,
-            *(row.level for row in side.filters[first:]),
-            *(row.noise_gain for row in side.filters[first:]),
+            *(row.level for row in rows[first:]),
+            *missing,
+            *(row.noise_gain for row in rows[first:]),
+            *missing,
             side.largest_gain,
         ]
         for side, use in sides
+        for rows in [side.filters]
+        for missing in [[None] * (most - len(rows))]
     ]
     return TextTable(columns, rows)
 
@@ -223,9 +232,10 @@ def window_warnings(window: Window) -> list[str]:
     """Return warnings of large errors and gains, a sentence each."""
     warnings = []
     level = responses.level(window, 1)
+    of = "the product of a pair" if window.form == "pair" else "F_1"
     if level > _HIGH_LEVEL:
         warnings.append(
-            f"the error of F_1 reaches {level:.2g} in the band, over {_HIGH_LEVEL:g}; "
+            f"the error of {of} reaches {level:.2g} in the band, over {_HIGH_LEVEL:g}; "
             "a narrower band or more samples lower it"
         )
     every = [window, *window.one_sided]

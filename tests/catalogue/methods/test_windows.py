@@ -26,10 +26,13 @@ GYRO = GyroResponse(Fraction(40), Fraction(7071, 10000), Fraction(100))
 
 
 def test_the_catalogue_lists_every_family_with_its_one_sided_filters():
-    assert list(WINDOW_TITLES) == ["window-3-3", "window-5-5", "window-7-7", "window-9-9"]
+    names = ["window-3-3", "window-5-5", "window-7-7", "window-9-9"]
+    pairs = ["pair-1-5", "pair-1-7", "pair-1-8", "pair-1-9", "pair-2-5", "pair-2-7"]
+    assert list(WINDOW_TITLES) == names + pairs
     assert {path.stem for path in FOLDER.iterdir()} == set(WINDOW_TITLES)
-    assert {"window-14-0", "window-0-14", "window-8-6", "window-6-8"} < set(WINDOWS)
-    assert len(list(WINDOWS)) == len(WINDOWS) == 4 + 6 + 10 + 14 + 18
+    assert {"window-14-0", "window-0-14", "window-8-6", "window-6-8", "pair-1-8-16-0"} < set(WINDOWS)
+    sides = [int(name.rpartition("-")[2]) for name in WINDOW_TITLES]
+    assert len(list(WINDOWS)) == len(WINDOWS) == sum(2 * side + 1 for side in sides) == 140
     with pytest.raises(KeyError):
         WINDOWS["window-8-7"]
 
@@ -42,7 +45,7 @@ def test_the_catalogue_is_lazy_and_needs_no_computer_algebra():
         "windows.verify(windows.WINDOWS['window-7-7']); print(windows._shipped_family.cache_info().currsize)"
     )
     said = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert said.stdout.split() == ["52", "0", "1"]
+    assert said.stdout.split() == ["140", "0", "1"]
 
 
 @FAMILIES
@@ -58,14 +61,17 @@ def test_a_file_is_one_that_a_user_could_hand_over(name):
 def test_filters_have_their_parity_and_their_sizes(name):
     window = WINDOWS[name]
     half = window.previous
-    assert window.parity and (window.ahead, window.increments) == (half, 1)
+    pair = name.startswith("pair")
+    increments = int(name.split("-")[1]) if pair else 1
+    assert window.parity and (window.ahead, window.increments) == (half, increments)
     sizes = [(one.previous, one.ahead) for one in window.one_sided]
     assert sizes == [(2 * half - k, k) for k in reversed(range(half))] + [
         (k, 2 * half - k) for k in range(half)
     ]
     for one in window.one_sided:
         assert window.one_sided_with(one.ahead) is one and WINDOWS[one.name] == one
-        assert one.name == f"window-{one.previous}-{one.ahead}"
+        assert one.name == f"{name if pair else 'window'}-{one.previous}-{one.ahead}"
+        assert (one.form, one.rotation == "exact") == ("legendre", increments > 1 or name == "window-9-9")
         assert one.mirrored().filters == window.one_sided_with(one.previous).filters and not one.parity
     assert [(one.previous, one.ahead, one.noise) for one in window.start] == [
         (k, 2 * half - k, 0) for k in range(half)

@@ -69,6 +69,10 @@ class Window:
         Path of the file; empty for a window of the catalogue.
     sibling : bool
         Whether it is one of the one-sided filters of another window.
+    form : str
+        "legendre" if each filter gives its coefficient, or "pair": F_1 times F_2/30 - F_0/6 gives the second-order term
+        of the rotation vector where both factors are of one frequency, as in coning, and there are no other filters.
+        One-sided filters are of the first form.
 
     Examples
     --------
@@ -98,6 +102,7 @@ class Window:
     start: tuple[Window, ...] = ()
     file: str = field(default="", compare=False, repr=False)
     sibling: bool = False
+    form: str = "legendre"
 
     __repr__ = short_repr
     _repr_latex_ = notebook_latex
@@ -144,6 +149,10 @@ class Window:
                 "beside the step"
             )
         return chosen, (chosen.increments, chosen.previous, chosen.ahead)
+
+    def partner(self, m: int) -> Taps | None:
+        """Return F_2 for F_1 of a pair, whose product counts; None for a filter that counts by itself."""
+        return self.filters[2] if self.form == "pair" and m == 1 else None
 
     @property
     def total_increments(self) -> int:

@@ -121,25 +121,27 @@ class Filtered:
         """Add a stage for the sum of the samples, each times its tap."""
         if not self._window.parity:
             return self._samples.combination(name, [exact(tap) for tap in taps], meaning)
-        sign, first, ahead = (-1) ** m, self._window.previous, self._window.ahead
-        after = first + self._window.increments
+        sign, count = (-1) ** m, self._window.increments
+        after = self._window.previous + count
         total = sp.zeros(3, 1)
-        for j in range(1, ahead + 1):
+        for j in (*range(1, self._window.ahead + 1), *range(1 - count // 2, 1)):
             if taps[after + j - 1]:
                 total += exact(taps[after + j - 1]) * self._pair(j, sign)
-        for k in range(first, after):
-            if taps[k]:
-                total += exact(taps[k]) * self._sample(k)
+        if count % 2 and taps[after - (count + 1) // 2]:
+            total += exact(taps[after - (count + 1) // 2]) * self._sample(after - (count + 1) // 2)
         return self._build.stage(Signal.vector(name, name, unit="rad", meaning=meaning), total)
 
     def _pair(self, j: int, sign: int) -> sp.Matrix:
-        """Return the sum or the difference of the samples j after the step and j before it."""
+        """Return the sum or the difference of the samples j after the step and j before it, from 0 down those in it."""
         if (j, sign) not in self._folded:
             weights = [sp.Integer(0)] * self._window.total_increments
             weights[self._window.previous + self._window.increments - 1 + j] = sp.Integer(1)
             weights[self._window.previous - j] = sp.Integer(sign)
-            name, what = (f"pair_{j}", "sum") if sign > 0 else (f"gap_{j}", "difference")
+            name, what = ("pair", "sum") if sign > 0 else ("gap", "difference")
             meaning = f"{what} of the samples {j} after the step and before it"
+            if j < 1:
+                name, meaning = f"inner_{name}", f"{what} of the samples {1 - j} from the ends of the step"
+            name = f"{name}_{j if j > 0 else 1 - j}"
             self._folded[j, sign] = self._samples.combination(name, weights, meaning)
         return self._folded[j, sign]
 

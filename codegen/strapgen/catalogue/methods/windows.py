@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cache
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 from strapgen.catalogue.coefficients import short_text
 from strapgen.catalogue.methods import coefficient_files, window_conditions
@@ -27,9 +27,11 @@ from strapgen.ir import checks
 from strapgen.ir.checks import counted
 from strapgen.ir.exceptions import InputError
 from strapgen.registry import Merged, Registry, Titles
+from strapgen.storage import streams
 
 OBJECTIVES = ("minimax", "mean square")
 ROTATIONS = ("fourth", "exact")
+FORMS = ("legendre", "pair")
 
 #: Most samples of a window, most conditions, the highest degree of the rate over a step, and most terms of the exact
 #: rotation.
@@ -115,8 +117,17 @@ class WindowFile:
         tuple[SideFile, ...] | None,
         Key("Filters of the first intervals of a recording, designed for less noise"),
     ] = None
+    form: Annotated[
+        str,
+        Key(
+            "Legendre coefficients each, or a pair whose product is that of coning; one-sided ones are legendre",
+            choices=FORMS,
+        ),
+    ] = "legendre"
 
     def __post_init__(self) -> None:
+        if self.form == "pair":
+            _check_pair(self)
         samples = self.previous + self.increments + self.ahead
         if samples > MOST_SAMPLES:
             raise InputError(f"the window has {samples} samples; at most {MOST_SAMPLES} are allowed")
@@ -137,6 +148,7 @@ class WindowFile:
                 self.band,
             ),
             *(self.objective, self.filters, self.gyro, self.noise, self.rotation, self.terms),
+            form=self.form,
         )
         one_sided = _all_one_sided(window, self.one_sided)
         start: tuple[Window, ...] = ()
@@ -181,12 +193,15 @@ def stored_sizes(previous: int, ahead: int, ideal: bool) -> list[tuple[int, int]
 
 
 def _families(files: Iterable[str]) -> dict[str, str]:
-    """Return the name of the family, which is that of its file, of every window; one-sided filters follow theirs."""
-    sizes = [(int(p), int(a)) for p, a in (name.split("-")[1:] for name in files)]
+    """Return the name of the family, which is that of its file, of every window; one-sided filters follow theirs.
+
+    The last number of a name is that of the samples on each side of the step.
+    """
+    sides = {name: int(name.rpartition("-")[2]) for name in files}
     return {
-        f"window-{before}-{after}": f"window-{previous}-{ahead}"
-        for previous, ahead in sorted(sizes)
-        for before, after in [(previous, ahead), *one_sided_sizes(previous, ahead)]
+        sibling_name(name, side, side, *size): name
+        for name, side in sorted(sides.items(), key=lambda pair: (pair[0].startswith("pair"), pair[0]))
+        for size in [(side, side), *one_sided_sizes(side, side)]
     }
 
 
@@ -285,6 +300,23 @@ def read(path: str | Path) -> Window:
     return replace(window, file=file, one_sided=one_sided, start=start)
 
 
+def named_or_read(argument: str | Path) -> Window:
+    """Return the window of a name, or of a file, its conditions verified.
+
+    >>> named_or_read("window-3-3").name
+    'window-3-3'
+    """
+    name = str(argument)
+    window = None if streams.names_file(name) else named_window(name)
+    if window is None and (streams.names_file(name) or Path(name).is_file()):
+        return read(argument)
+    if window is None:
+        checks.choice("window", name, WINDOW_TITLES, "their one-sided filters, as window-14-0, or a file")
+    assert window is not None
+    verify(window)
+    return window
+
+
 def _read(path: str | Path, name: str = "") -> Window:
     """Return the family of a file under its own name or another one."""
 
@@ -369,12 +401,11 @@ def _stored_filters(
             raise InputError(
                 f"{key}[{number}]: {counted(size[0], 'sample')} before and {size[1]} ahead are {twice}"
             )
-        _check_taps(
-            f"{key}[{number}].filters", table.filters, window.degree + 1, window.increments + sum(size)
-        )
+        rows = len(tables[0].filters) if window.form == "pair" else window.degree + 1
+        _check_taps(f"{key}[{number}].filters", table.filters, rows, window.increments + sum(size))
         stored[size] = replace(
             window,
-            sibling=True,
+            **of_sibling(window),
             name=sibling_name(window.name, window.previous, window.ahead, *size),
             title=sibling_title(window.title, *size),
             previous=table.previous,
@@ -385,6 +416,24 @@ def _stored_filters(
             filters=table.filters,
         )
     return stored
+
+
+def of_sibling(window: Window) -> dict[str, Any]:
+    """Return what one-sided filters have unlike their window; steps of several samples take the exact rotation.
+
+    >>> of_sibling(WINDOWS["window-3-3"])
+    {'sibling': True, 'form': 'legendre', 'rotation': 'fourth'}
+    """
+    rotation = "exact" if window.increments > 1 else window.rotation
+    return {"sibling": True, "form": "legendre", "rotation": rotation}
+
+
+def _check_pair(file: WindowFile) -> None:
+    """Refuse a file of a pair with what does not go with one."""
+    if len(file.filters) != 3:
+        raise InputError(f"filters has {counted(len(file.filters), 'row')}; a pair has 3, of c_0 to c_2")
+    if file.gyro is not None:
+        raise InputError("a pair goes with no gyro; its increments are integrals of the rate")
 
 
 def _check_taps(what: str, rows: Sequence[Taps], count: int, samples: int) -> None:

@@ -173,7 +173,8 @@ def sources(
 def _identifier(window: Window, algorithm: str, target: str, name: str | None) -> str:
     """Return the prefix of the names of functions and files."""
     infix = f"_w{WORD}" if BUILT_IN[target].fixed else real_of(target).infix
-    default = f"{algorithm}_late_{window.name.removeprefix('window-')}".replace("-", "_") + infix
+    samples = window.name.removeprefix("window-").removeprefix("pair-")
+    default = f"{algorithm}_late_{samples}".replace("-", "_") + infix
     identifier = default if name is None else name
     if name is not None and not re.fullmatch(r"[A-Za-z]\w*", name, re.ASCII):
         raise InputError(f"--name is {name!r}; letters, digits and underscores are needed, a letter first")

@@ -93,14 +93,20 @@ class LateFilters:
     @property
     def degree(self) -> int:
         """Highest Legendre coefficient that a step takes."""
-        return min(self.window.degree, max(EXACT_DEGREES if self.exact else LEGENDRE_DEGREES))
+        degree = max(one.degree for one in (self.window, *self.window.one_sided))
+        return min(degree, max(EXACT_DEGREES if self.exact else LEGENDRE_DEGREES))
 
     @cached_property
     def sets(self) -> tuple[Rows, ...]:
         """The filters by the number of samples before the interval, from none to p + L."""
         start = () if self.calm_start else self.window.start
         by_previous = {one.previous: one for one in (self.window, *self.window.one_sided, *start)}
-        return tuple(self._scale(by_previous[k].filters[: self.degree + 1]) for k in range(self.samples))
+        none: Rows = (
+            (Fraction(0),) * self.samples,
+        ) * self.degree  # a pair has fewer than what goes beside it
+        return tuple(
+            self._scale((*by_previous[k].filters, *none)[: self.degree + 1]) for k in range(self.samples)
+        )
 
     @cached_property
     def short(self) -> tuple[Rows, ...]:

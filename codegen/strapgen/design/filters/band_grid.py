@@ -89,8 +89,29 @@ class BandGrid:
         """Return h squared in magnitude, by frequency."""
         return [(x * x + y * y) >> BITS for x, y in self.gains]
 
-    def errors(self, m: int, taps: Sequence[int], previous: int) -> list[tuple[int, int]]:
-        """Return the error of a filter as real and imaginary part, by frequency."""
+    def coning(self) -> list[int]:
+        """Return what two rates of one frequency add to the rotation vector of a step, (sin bN - bN)/(2 b^2)."""
+        turns = [self._increments * b for b in self.points]
+        return [integer((REAL.sin(x) - x) * self._increments**2 / (2 * x * x)) if x else 0 for x in turns]
+
+    def lever(self, second: Sequence[int]) -> list[int]:
+        """Return the response of F_2/30 - F_0/6, F_2 as many symmetric taps and F_0 those of an ideal gyro."""
+        errors = self.errors(2, second, (len(second) - self._increments) // 2)
+        wanted = zip(errors, self.bessel(2), self.bessel(0), strict=True)
+        return [(error + second_order - 5 * mean) // 30 for (error, _), second_order, mean in wanted]
+
+    def errors(
+        self, m: int, taps: Sequence[int], previous: int, second: Sequence[int] | None = None
+    ) -> list[tuple[int, int]]:
+        """Return the error of a filter as real and imaginary part, by frequency.
+
+        With the taps of the second filter of a pair it is that of the product of its lever and the first filter.
+        """
+        if second is not None:
+            parts = zip(
+                self.errors(m, taps, previous), self.bessel(m), self.lever(second), self.coning(), strict=True
+            )
+            return [(0, ((im + own) * lever >> BITS) - wanted) for (_, im), own, lever, wanted in parts]
         result = []
         even, odd = _fold(taps, 2 * previous + self._increments - 1)
         for cosines, sines, (x, y), right in zip(

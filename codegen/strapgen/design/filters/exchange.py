@@ -17,6 +17,7 @@ from math import isqrt
 from operator import mul
 from typing import Any, NamedTuple, Protocol
 
+from strapgen.catalogue.methods.window import Taps
 from strapgen.design.filters.band_grid import (
     BITS,
     REAL,
@@ -223,17 +224,19 @@ class Minimax(NamedTuple):
     level: Any
 
 
-def minimax_filter(unknowns: Unknowns, band: Fraction, points: int = SEARCH_POINTS) -> Minimax:
+def minimax_filter(
+    unknowns: Unknowns, band: Fraction, points: int = SEARCH_POINTS, second: Taps | None = None
+) -> Minimax:
     """Return the filter of the least largest error over a band under its conditions.
 
-    `band`: highest angular frequency in rad a sample.
+    `band`: highest angular frequency in rad a sample. `second`: F_2 of a pair whose F_1 this is; see `BandGrid.errors`.
 
     >>> from strapgen.design.filters.filter_taps import Shape
     >>> filter = minimax_filter(Unknowns(Shape(3, 3, 4), 1), Fraction(13, 10))
     >>> [round(float(tap), 12) for tap in filter.taps[4:]], f"{float(filter.level):.6e}"
     ([0.408856141152, -0.099584912922, 0.013437894897], '2.160751e-03')
     """
-    solution = least_largest(FilterProblem(unknowns), band, points)
+    solution = least_largest(FilterProblem(unknowns, second), band, points)
     values = [REAL.mpf(x.numerator) / x.denominator for x in unknowns.complete([Fraction(0)] * unknowns.free)]
     for value, direction in zip(solution.free, unknowns.directions, strict=True):
         values = [x + value * d.numerator / d.denominator for x, d in zip(values, direction, strict=True)]
@@ -243,10 +246,11 @@ def minimax_filter(unknowns: Unknowns, band: Fraction, points: int = SEARCH_POIN
 class FilterProblem:
     """The error of a symmetric or antisymmetric filter, whose answers are real."""
 
-    def __init__(self, unknowns: Unknowns) -> None:
+    def __init__(self, unknowns: Unknowns, second: Taps | None = None) -> None:
         self._unknowns = unknowns
         self.title = f"the filter of c_{unknowns.m}"
         self.free = unknowns.free
+        self._second = None if second is None else list(map(integer, second))
         self._directions = [[integer(x) for x in direction] for direction in unknowns.directions]
         self._base = [integer(x) for x in unknowns.complete([Fraction(0)] * unknowns.free)]
 
@@ -254,23 +258,27 @@ class FilterProblem:
         """Return the answers at frequencies in rad a sample."""
         unknowns = self._unknowns
         shape = unknowns.shape
-        grid = BandGrid(points, shape.twice_middle // 2, increments=shape.increments)
+        reach = max(shape.samples, len(self._second or ())) // 2
+        grid = BandGrid(points, reach, increments=shape.increments)
+        gains, wanted = [gain for gain, _ in grid.gains], grid.bessel(unknowns.m)
+        if self._second is not None:
+            gains = [
+                gain * lever >> BITS for gain, lever in zip(gains, grid.lever(self._second), strict=True)
+            ]
+            wanted = grid.coning()
         tables = grid.sines if unknowns.m % 2 else grid.cosines
         single = []
         for group in unknowns.groups:
             number, _ = distance(group[0][0], shape.twice_middle)
             single.append(
-                [
-                    len(group) * gain * row[number] >> BITS
-                    for (gain, _), row in zip(grid.gains, tables, strict=True)
-                ]
+                [len(group) * gain * row[number] >> BITS for gain, row in zip(gains, tables, strict=True)]
             )
         rows = list(zip(*single, strict=True)) or [()] * len(points)
         return Responses(
             [[sum(map(mul, direction, row)) >> BITS for row in rows] for direction in self._directions],
             [
                 value - (sum(map(mul, self._base, row)) >> BITS)
-                for value, row in zip(grid.bessel(unknowns.m), rows, strict=True)
+                for value, row in zip(wanted, rows, strict=True)
             ],
         )
 

@@ -218,6 +218,9 @@ class _Search:
             window.band, window.total_increments - 1, window.gyro, _POINTS, window.increments
         )
 
+        second = window.partner(unknowns.m)
+        self._second = None if second is None else list(map(integer, second))
+
     def best(self, taps: Taps) -> Taps:
         """Return the taps of the least largest error."""
         if self._in_words(taps):
@@ -272,7 +275,7 @@ class _Search:
         """Return the errors on the grid, with one of the unknowns a unit higher."""
         values = [value + self._unit * (place == moved) for place, value in enumerate(values)]
         taps = [integer(tap) for tap in self._unknowns.taps(values)]
-        errors = self._grid.errors(self._unknowns.m, taps, self._window.previous)
+        errors = self._grid.errors(self._unknowns.m, taps, self._window.previous, self._second)
         return np.array([complex(re / ONE, im / ONE) for re, im in errors])
 
 

@@ -12,6 +12,7 @@ from operator import mul
 from typing import Any
 
 from strapgen.catalogue.methods import window_conditions
+from strapgen.catalogue.methods.window import Taps
 from strapgen.design.filters.band_grid import (
     BITS,
     ONE,
@@ -33,10 +34,12 @@ def mean_square_filters(
     band: Fraction,
     noise: Fraction,
     spectrum: Sequence[int] | None = None,
+    second: Taps | None = None,
 ) -> list[list[Any]]:
     """Return the filters of the least mean of S |sum_j F_j A_j - C_m|^2 over a band plus sigma^2 sum_j F_j^2.
 
-    `band`: highest angular frequency in rad a sample; the mean is over `band_grid.mean_points`.
+    `band`: highest angular frequency in rad a sample; the mean is over `band_grid.mean_points`. `second`: F_2 of a pair
+    whose F_1 this is; the error is that of the product with its lever, by the root mean square of this.
 
     >>> taps, = mean_square_filters(Shape(1, 1, 3), [1], Fraction(1), Fraction(0))
     >>> [round(float(tap), 12) for tap in taps]
@@ -45,7 +48,13 @@ def mean_square_filters(
     grid = mean_grid(band, shape.samples - 1, shape.gyro, shape.increments)
     weights = [ONE] * len(grid.points) if spectrum is None else list(spectrum)
     weights = [weight // len(weights) for weight in weights]
-    return least_squares(grid, shape, degrees, weights, noise)
+    if second is None:
+        return least_squares(grid, shape, degrees, weights, noise)
+    lever = grid.lever(list(map(integer, second)))
+    weights = [weight * value * value >> 2 * BITS for weight, value in zip(weights, lever, strict=True)]
+    weights = [(weight << BITS) // sum(weights) for weight in weights]
+    wanted = [(value << BITS) // by for value, by in zip(grid.coning(), lever, strict=True)]
+    return least_squares(grid, shape, degrees, weights, noise, wanted)
 
 
 def least_squares(
@@ -54,8 +63,12 @@ def least_squares(
     degrees: Sequence[int],
     weights: Sequence[int],
     noise: Fraction = Fraction(0),
+    wanted: Sequence[int] | None = None,
 ) -> list[list[Any]]:
-    """Return the filters of least weighted sum of squares of errors on a grid, under their conditions."""
+    """Return the filters of least weighted sum of squares of errors on a grid, under their conditions.
+
+    `wanted`: response by frequency, by default that of the Legendre coefficients.
+    """
     count, powers = shape.samples, shape.conditions
     scaled = [(w * square) >> BITS for w, square in zip(weights, grid.squares(), strict=True)]
     lags = [real(sum(map(mul, scaled, column)) >> BITS) for column in zip(*grid.lags, strict=True)]
@@ -65,16 +78,18 @@ def least_squares(
         [*(lags[abs(i - j)] for j in range(count)), *(row[i] for row in rows)] for i in range(count)
     ] + [[*row, *[REAL.mpf(0)] * powers] for row in rows]
     rights = [
-        _products(grid, shape, m, weights)
+        _products(grid, shape, m, weights, grid.bessel(m) if wanted is None else wanted)
         + [REAL.mpf(r.numerator) / r.denominator for r in window_conditions.coefficients(m, powers)]
         for m in degrees
     ]
     return [solution[:count] for solution in solve(matrix, rights)]
 
 
-def _products(grid: BandGrid, shape: Shape, m: int, weights: Sequence[int]) -> list[Any]:
-    """Return the products of the functions of the samples with the Legendre coefficient."""
-    right = [(w * value) >> BITS for w, value in zip(weights, grid.bessel(m), strict=True)]
+def _products(
+    grid: BandGrid, shape: Shape, m: int, weights: Sequence[int], wanted: Sequence[int]
+) -> list[Any]:
+    """Return the products of the functions of the samples with a response."""
+    right = [(w * value) >> BITS for w, value in zip(weights, wanted, strict=True)]
     re = [(x * value) >> BITS for (x, _), value in zip(grid.gains, right, strict=True)]
     im = [(y * value) >> BITS for (_, y), value in zip(grid.gains, right, strict=True)]
     result = []

@@ -32,12 +32,14 @@ _GAIN_POINTS = 2000
 def level(window: Window, m: int) -> float:
     """Return the largest error of a filter over its band, for each unit of rate times the sampling interval.
 
+    That of F_1 of a pair is of the product with F_2/30 - F_0/6, for each unit squared.
+
     >>> from strapgen.catalogue.methods.windows import WINDOWS
     >>> f"{level(WINDOWS['window-3-3'], 1):.6e}"
     '2.160751e-03'
     """
     grid = search_grid(window.band, window.total_increments - 1, window.gyro, increments=window.increments)
-    errors = [magnitude(*e) for e in grid.errors(m, _integers(window, m), window.previous)]
+    errors = [magnitude(*e) for e in grid.errors(*_filter(window, m))]
     place = max(range(len(errors)), key=lambda k: errors[k])
     largest = errors[place]
     if not largest or place in (0, len(errors) - 1):
@@ -90,7 +92,7 @@ def errors(window: Window, m: int, points: Sequence[float]) -> NDArray[Any]:
     grid = BandGrid(
         [REAL.mpf(b) for b in points], window.total_increments - 1, window.gyro, window.increments
     )
-    return np.array([magnitude(*e) / ONE for e in grid.errors(m, _integers(window, m), window.previous)])
+    return np.array([magnitude(*e) / ONE for e in grid.errors(*_filter(window, m))])
 
 
 def polynomial_fit(window: Window) -> tuple[tuple[Fraction, ...], ...]:
@@ -108,8 +110,11 @@ def polynomial_fit(window: Window) -> tuple[tuple[Fraction, ...], ...]:
     return tuple(filters)
 
 
-def _integers(window: Window, m: int) -> list[int]:
-    return [integer(tap) for tap in window.filters[m]]
+def _filter(window: Window, m: int) -> tuple[int, list[int], int, list[int] | None]:
+    """Return the arguments of `BandGrid.errors` for a filter."""
+    second = window.partner(m)
+    taps, other = ([integer(tap) for tap in row or ()] for row in (window.filters[m], second))
+    return m, taps, window.previous, other if second else None
 
 
 #: Binary digits of a density by its mean. Its last digits in double precision depend on the machine; these do not.
