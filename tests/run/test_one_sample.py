@@ -123,3 +123,18 @@ def test_threads_do_not_share_memory(backend_name, rng):
     with ThreadPoolExecutor(4) as pool:
         made = list(pool.map(backend.step, states, samples))
     assert np.stack(made).tobytes() == wanted
+
+
+@pytest.mark.parametrize("backend_name", BACKENDS)
+def test_a_declared_range_is_held_by_one_sample_too(backend_name):
+    settings = strapgen.Settings.of(max_rate_deg_s=400, step="0.01")
+    choice = strapgen.choose("euler", "coning-combined", 3, previous=3)
+    backend = strapgen.backend(choice, backend=backend_name, settings=settings)
+    samples = np.full((6, 3), 0.01, backend.dtype)
+    assert backend.step(backend.identity, samples).shape == (4,)
+    samples[-1, -1] = -1
+    with pytest.raises(strapgen.InputError, match=r"increments holds 1; .* was generated for at most"):
+        backend.step(backend.identity, samples)
+    samples[0, 0] = np.inf
+    with pytest.raises(strapgen.InputError, match=r"increments holds inf at index \(0, 0\); finite"):
+        backend.step(backend.identity, samples)

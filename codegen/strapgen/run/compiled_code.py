@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from functools import cache, partial
+from functools import cache, cached_property, partial
 from itertools import accumulate, pairwise
 from math import isfinite
 from typing import Any
@@ -12,13 +12,21 @@ from typing import Any
 import numpy as np
 
 from strapgen.ir.exceptions import InputError
+from strapgen.ir.program import COUNTED_AS
 from strapgen.ir.sources import Sources
 from strapgen.run import compiler
+from strapgen.run.backend_names import ORDERS
 from strapgen.run.evaluators import Array, Evaluator, Loop
 from strapgen.targets import TARGETS
 
 #: The types of floating-point targets in numpy.
 _TYPES: dict[str, np.dtype[Any]] = {"double": np.dtype(np.float64), "float": np.dtype(np.float32)}
+#: Operations of `Program.operations` of which none with a number that is not finite is finite.
+_SPREADING = frozenset(("add", "multiply", "negate"))
+#: The other ones.
+_OTHERS = frozenset(kind for kind in COUNTED_AS.values() if kind is not None) - _SPREADING
+#: The generated loop of each order.
+_LOOPS = dict(zip(ORDERS, ("propagate", "scan"), strict=True))
 #: Runs that generated loops take side by side, in any type.
 _GROUP = 16
 
@@ -55,6 +63,7 @@ class CEvaluator(Evaluator):
         self._takes_one = fixed is None
         #: Memory for calls on one sample, of which every thread takes its own.
         self._idle: list[_OneSample] = []
+        self.scans = hasattr(self.module.lib, f"{self.function.name}_scan")
 
     @property
     def name(self) -> str:
@@ -105,6 +114,21 @@ class CEvaluator(Evaluator):
             )
         return InputError(f"{self.kernel} refuses its input{where}: it is too far from a proper one")
 
+    @cached_property
+    def spreads_nonfinite(self) -> bool:
+        """Whether no state after a sample that is not finite is finite.
+
+        No sum or product with a number that is not finite is finite. So it is where a step has no other operations,
+        and every element of its inputs reaches the next state, as one that is no number shows.
+        """
+        if self.sources.fixed is not None or any(self.sources.operations[kind] for kind in _OTHERS):
+            return False
+        sizes = [signal.size for signal in self.function.inputs]
+        rows = np.zeros((sum(sizes), sum(sizes)))
+        np.fill_diagonal(rows, np.nan)
+        outputs, _ = self.call(np.split(rows, np.cumsum(sizes)[:-1], axis=1), np.empty((len(rows), 0)))
+        return bool(np.isnan(outputs[0]).any(axis=1).all())
+
     def pointer(self, array: Array) -> Any:
         """Return the C pointer to a contiguous array's first element."""
         return self.module.ffi.from_buffer(array_type(array.dtype), array)
@@ -117,14 +141,14 @@ class CEvaluator(Evaluator):
     def loop(self, samples: Array, loop: Loop) -> tuple[Array, Array]:
         """Run the loop in C, see `Evaluator.loop`; threads share independent runs in floating point."""
         ffi, name, fixed = self.module.ffi, self.function.name, self.sources.fixed
-        propagate = getattr(self.module.lib, f"{name}_propagate")
+        propagate = getattr(self.module.lib, f"{name}_{_LOOPS[loop.order]}")
         runs, steps = samples.shape[:2]
         state, rows = (
             np.ascontiguousarray(array, kind)
             for array, kind in zip((loop.state, samples), self.input_types, strict=True)
         )
         feedback = np.array(loop.feedback, self.feedback_type)
-        history = np.empty((runs, 1 + steps // loop.record_every, state.shape[1]), self.word_type)
+        history = loop.room((runs, 1 + steps // loop.record_every, state.shape[1]), self.word_type)
         restore = ffi.NULL
         if isinstance(loop.restore, CEvaluator):
             restore = ffi.cast(f"{name}_orthonormalizer", loop.restore.address())

@@ -103,7 +103,7 @@ class NumpyEvaluator(Evaluator):
             return super().loop(samples, loop)
         runs, steps = samples.shape[:2]
         shape = self.function.inputs[0].shape
-        history = np.empty((runs, 1 + steps // loop.record_every, *shape))
+        history = loop.room((runs, 1 + steps // loop.record_every, *shape), self.number)
         history[:, 0] = state = loop.state.reshape(runs, *shape)
         assert self.sources.attitude_step is not None, "only an attitude step has a product"
         identity = np.array([float(x) for x in self.sources.attitude_step.identity])
