@@ -72,6 +72,8 @@ class FamilyBrief:
     >>> brief = FamilyBrief(previous=2, ahead=2, band=Fraction(1))
     >>> brief.objective, brief.full_title
     ('minimax', 'Window 1+2+2 to 1 rad')
+    >>> FamilyBrief(8, 8, Fraction(13, 10), taps=(8, 6)).full_title
+    'Pair 1+8+8 of 8/6 taps to 1.3 rad'
     """
 
     previous: int
