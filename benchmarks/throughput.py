@@ -11,9 +11,7 @@ import argparse
 import ctypes
 import os
 import re
-import resource
 import subprocess
-import sys
 import tempfile
 import time
 from pathlib import Path
@@ -28,14 +26,6 @@ from strapgen.run.evaluators import Loop
 
 #: Runs side by side, and the steps of each.
 RUNS, STEPS = 10_000, 20
-#: A call of ``strapgen generate`` whose text is in the cache.
-GENERATE = ("generate", "euler", "--method", "rk4", "--increments", "2", "--target", "c", "--force")
-
-
-def of_children() -> float:
-    """Return the processor time of the processes that this one has started, s."""
-    used = resource.getrusage(resource.RUSAGE_CHILDREN)
-    return used.ru_utime + used.ru_stime
 
 
 def least(candidates: dict, rounds: int, clock=time.perf_counter) -> dict[str, float]:
@@ -208,33 +198,6 @@ def back_ends(rounds: int) -> None:
     show(f"{jobs} threads / one, {RUNS} runs, elapsed time", times["all"] / times["one"])
 
 
-def processes(rounds: int) -> None:
-    """Print what generating from the cache takes beyond ``strapgen --help``."""
-    program = [sys.executable, "-m", "strapgen"]
-    with tempfile.TemporaryDirectory() as folder:
-        commands = {"--help": ("--help",), "generate": (*GENERATE, "--out", folder)}
-        times = least(
-            {
-                name: lambda words=words: subprocess.run(
-                    [*program, *words], check=True, stdout=subprocess.DEVNULL
-                )
-                for name, words in commands.items()
-            },
-            rounds,
-            of_children,
-        )
-        said = subprocess.run(
-            [sys.executable, "-X", "importtime", "-m", "strapgen", *GENERATE, "--out", folder],
-            check=True,
-            capture_output=True,
-            text=True,
-        ).stderr
-    show("generating from the cache less strapgen --help, s", times["generate"] - times["--help"], 0.15)
-    show("generating from the cache / strapgen --help", times["generate"] / times["--help"])
-    imported = any(line.rpartition("|")[2].strip() == "sympy" for line in said.splitlines())
-    print(f"it imports SymPy: {'yes' if imported else 'no'}")
-
-
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--rounds", type=int, default=40)
@@ -243,7 +206,6 @@ def main() -> None:
         loops(5 * options.rounds, narrow)
     series(options.rounds)
     back_ends(max(1, options.rounds // 4))
-    processes(max(1, options.rounds // 4))
 
 
 if __name__ == "__main__":

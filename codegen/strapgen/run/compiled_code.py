@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from functools import cache, cached_property
-from itertools import pairwise
+from functools import cache, cached_property, partial
+from itertools import accumulate, pairwise
+from math import isfinite
 from typing import Any
 
 import numpy as np
@@ -59,6 +60,9 @@ class CEvaluator(Evaluator):
             self.word_type, self.feedback_type = np.dtype(f"int{word}"), np.dtype(f"uint{word}")
         self.module: Any = compiler.load(sources)
         self._array = getattr(self.module.lib, f"{self.function.name}_array")
+        self._takes_one = fixed is None
+        #: Memory for calls on one sample, of which every thread takes its own.
+        self._idle: list[_OneSample] = []
         self.scans = hasattr(self.module.lib, f"{self.function.name}_scan")
 
     @property
@@ -66,6 +70,19 @@ class CEvaluator(Evaluator):
         """Name of the back end."""
         fixed = self.sources.fixed
         return self.sources.target if fixed is None else f"{self.sources.target}{fixed.settings.word}"
+
+    def __call__(self, *values: Any) -> Any:
+        """Evaluate the kernel, see `Evaluator.__call__`: one sample in floating point where it lies."""
+        if self._takes_one and self.one_sample(values):
+            try:
+                one = self._idle.pop()
+            except IndexError:
+                one = _OneSample(self)
+            results = one.run(values)
+            self._idle.append(one)
+            if results is not None:
+                return results
+        return super().__call__(*values)
 
     def call(self, inputs: Sequence[Any], feedback: Any, where: str = "") -> tuple[Sequence[Any], Any]:
         """Call the function on rows, see `Evaluator.call`."""
@@ -170,6 +187,32 @@ def _parts(runs: int, jobs: int) -> list[slice]:
     jobs = min(jobs, groups)
     edges = [min(runs, groups * job // jobs * _GROUP) for job in range(jobs + 1)]
     return [slice(first, stop) for first, stop in pairwise(edges) if first < stop]
+
+
+class _OneSample:
+    """Memory of a function in floating point for one sample, whose pointers are made once."""
+
+    def __init__(self, evaluator: CEvaluator) -> None:
+        signals, results = evaluator.function.inputs, evaluator.function.outputs
+        self._numbers = np.empty(sum(signal.size for signal in signals), evaluator.dtype)
+        edges = [0, *accumulate(signal.size for signal in signals)]
+        self._inputs = [
+            self._numbers[first:stop].reshape(signal.shape)
+            for (first, stop), signal in zip(pairwise(edges), signals, strict=True)
+        ]
+        self._results = [np.empty(signal.shape, evaluator.dtype) for signal in results]
+        pointers = map(evaluator.pointer, (*self._inputs, *self._results))
+        self._call = partial(evaluator._array, 1, *pointers)
+
+    def run(self, values: Sequence[Array]) -> Any:
+        """Return the output of the function, or its outputs, for finite inputs; None for others."""
+        for place, value in zip(self._inputs, values):  # noqa: B905  # of one length
+            place[...] = value
+        if not isfinite(sum(self._numbers.tolist())):
+            return None
+        self._call()
+        results = self._results
+        return results[0].copy() if len(results) == 1 else tuple([result.copy() for result in results])
 
 
 class ModelEvaluator(Evaluator):

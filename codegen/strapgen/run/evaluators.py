@@ -91,6 +91,8 @@ class Evaluator(ABC):
         self.kernel: str = sources.kernel
         self.function: Function = sources.function
         self.dtype: np.dtype[Any] = np.dtype(dtype)
+        self._shapes = [signal.shape for signal in self.function.inputs]
+        self._has_limits = any(signal.limit is not None for signal in self.function.inputs)
         #: Type of the numbers that `run` takes and returns: an object is one of mpmath.
         self.number: np.dtype[Any] = self.dtype
         if sources.fixed is not None:
@@ -149,6 +151,27 @@ class Evaluator(ABC):
             raise InputError(f"the leading axes of {shapes} do not broadcast together") from None
         results = self.evaluate(arrays, batch)
         return results[0] if len(results) == 1 else results
+
+    def one_sample(self, values: Sequence[Any]) -> bool:
+        """Return whether inputs are arrays of `dtype` that hold one sample within its range, finite or not.
+
+        A subclass may call its code on such at once, if they are finite; `__call__` checks and converts all others.
+        """
+        if len(values) != len(self._shapes):
+            return False
+        dtype = self.dtype
+        for value, shape in zip(values, self._shapes):  # noqa: B905  # checked above, at less cost
+            if type(value) is not np.ndarray or value.shape != shape or value.dtype != dtype:
+                return False
+        return not self._has_limits or self._within_limits(values)
+
+    def _within_limits(self, values: Sequence[Array]) -> bool:
+        try:
+            for place, value in enumerate(values):
+                self.check_limit(place, value)
+        except InputError:
+            return False
+        return True
 
     def evaluate(self, arrays: Sequence[Array], batch: tuple[int, ...]) -> tuple[Array, ...]:
         """Evaluate on checked arrays whose leading axes broadcast to `batch`."""
