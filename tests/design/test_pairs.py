@@ -10,7 +10,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import strapgen
-from strapgen import CommitLate, choose, derive, lower
+from strapgen import CommitLate, choose, derive, lower, recording_attitudes
 from strapgen.catalogue.methods import windows
 from strapgen.catalogue.methods.window import GyroResponse, Window
 from strapgen.catalogue.methods.windows import WINDOWS
@@ -317,3 +317,17 @@ def test_a_pair_is_committed_late_and_answers_now(backend):
     for first in range(25 - 17 + 1, 200 - 17 + 1):
         start = step.step(start, increments[first : first + 17])
     assert apart(start, unit.attitude) < 1e-12 + 5 * noise
+
+
+def test_a_recording_is_covered_from_end_to_end():
+    cone = strapgen.motion("cone", half_angle_deg=1, frequency_hz=20)
+    row = cone.samples(Fraction(1, 100), 0, 60)
+    states = recording_attitudes("pair-1-8", row)
+    unit = CommitLate("pair-1-8")
+    for sample in row:
+        unit.push(sample)
+    unit.flush()
+    np.testing.assert_allclose(states[-1], unit.attitude, atol=1e-14)
+    true = cone.attitude(np.arange(61) / 100)
+    apart = Rotation.from_quat(states) * Rotation.from_matrix(true[0].T @ true).inv()
+    assert 1e-9 < apart.magnitude().max() < 1e-7

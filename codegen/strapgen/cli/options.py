@@ -220,6 +220,7 @@ class MethodOptions:
             "--window",
             metavar="NAME|FILE",
             help="A window as pair-1-8, or a TOML file with your own, in place of --method; window design writes one.",
+            words="strapgen.catalogue.methods.windows:WINDOWS",
         ),
     ] = None
     coning: Annotated[

@@ -47,6 +47,9 @@ class Number(Fraction):
     def __str__(self) -> str:
         return self.text
 
+    def __format__(self, form: str) -> str:  # from Python 3.12 on a Fraction's own does not ask __str__
+        return super().__format__(form) if form else self.text
+
     def __reduce__(self) -> Any:
         return type(self), (self.numerator, self.denominator), {"text": self.text}
 

@@ -75,7 +75,11 @@ _LEFT, _RIGHT = 9.0, 1.5
 #: Gain from which an algorithm that costs more is on the frontier: it has half the drift.
 _GAIN = 0.5
 #: Kinds of algorithms by how their names begin; all others are of the last kind.
-_KINDS = {"window": "windows", "coning": "coning coefficients", "": "fits of the rate, integrated"}
+_KINDS = {
+    ("window", "pair"): "windows",
+    ("coning",): "coning coefficients",
+    ("",): "fits of the rate, integrated",
+}
 
 
 def frontier_image(result: FrontierResult, path: str | Path) -> bytes:
