@@ -18,6 +18,7 @@ from strapgen.fixedpoint import bounded_series
 from strapgen.fixedpoint.bounded_series import SHARE, with_declared_ranges
 from strapgen.fixedpoint.floating import rounding_bounds
 from strapgen.fixedpoint.floating.errors import NUMBERS
+from strapgen.fixedpoint.quantization import lowered
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.program import OPERATIONS, Constant, Node, Operation, Program
@@ -292,3 +293,20 @@ def test_exact_steps_normalize_by_a_series():
     made = with_declared_ranges(step, Settings.of(largest_angle="0.004"))
     assert step.operations["sqrt"] == step.operations["divide"] == 1
     assert made.operations["sqrt"] == made.operations["divide"] == 0
+
+
+def test_fixed_point_normalizes_by_a_series_where_that_costs_no_error(rng):
+    step = pipeline.program(catalogue.choose("euler", "taylor3", 3))
+    settings = Settings.of(largest_angle="0.01")
+    made = strapgen.quantize(step, settings)
+    assert not made.operations.get("sqrt") and not made.operations.get("divide")
+    assert made.program == step  # the contract is that of the closed form
+    assert made.error_bounds["next"] < lowered(step, settings).error_bounds["next"]
+    model = strapgen.build(strapgen.generate(made, "fixed-model"))
+    increments = model.representable(rng.choice([-0.01, 0.01], (8, 3, 3)) * 0.999)
+    state = np.array([0.5, -0.5, 0.5, 0.5])
+    names = [element for signal in step.inputs for element in signal.elements]
+    for angles in increments:
+        exact = exactly(step, dict(zip(names, [*state, *angles.ravel()], strict=True)))["next"]
+        for found, true in zip(model.step(state, angles), exact, strict=True):
+            assert abs(Fraction(float(found)) - true) <= made.error_bounds["next"]

@@ -14,6 +14,7 @@ __all__ = ["OPERATIONS", "FixedProgram", "Format", "Interface", "Settings", "can
 
 def quantize(program: Program, settings: Settings) -> FixedProgram:
     """Lower a program to integers."""
+    from strapgen.fixedpoint.bounded_series import without_roots
     from strapgen.fixedpoint.quantization import lowered
     from strapgen.fixedpoint.sensor_scale import counted, in_counts
 
@@ -22,7 +23,12 @@ def quantize(program: Program, settings: Settings) -> FixedProgram:
         raise InputError(f"{program.kernel} takes no increments; {what} does not go with it")
     counts = program if settings.sensor is None else in_counts(program, settings.sensor)
     try:
-        return replace(lowered(counts, settings), program=program)
+        fixed = lowered(counts, settings)
+        series = without_roots(counts, settings)
+        other = fixed if series is counts else lowered(series, settings)
+        if all(other.error_bounds[name] <= error for name, error in fixed.error_bounds.items()):
+            fixed = other
+        return replace(fixed, program=program)
     except InputError:
         raise
     except (ValueError, ArithmeticError) as error:  # a proof fails, as where a divisor may be zero

@@ -14,6 +14,7 @@ from fractions import Fraction
 from itertools import count
 
 from strapgen.fixedpoint.floating.errors import NUMBERS, Expressions, NoBoundError, NumberFormat
+from strapgen.fixedpoint.format_plan import MOST_GUARD_BITS, limits
 from strapgen.fixedpoint.intervals import Interval, root
 from strapgen.fixedpoint.series import binomial_series, sine_series
 from strapgen.ir import checks
@@ -83,6 +84,20 @@ def with_declared_ranges(program: Program, settings: Settings, number: str = "do
         return declared
     said = f"Series in place of functions: {'; '.join(notes)}."
     return replace(series, info=replace(declared.info, notes=(*program.notes, said)))
+
+
+def without_roots(program: Program, settings: Settings) -> Program:
+    """Return a program with series for roots and quotients, as far as the ranges of fixed point allow them.
+
+    A remainder is at most an eighth of the last place of a word that holds 1, as those of sines and cosines.
+    """
+    box: dict[str, Interval] = {}
+    for limit in limits(program, settings):
+        whole = limit.range(0)
+        for guard_bits in range(1, MOST_GUARD_BITS + 1):
+            whole = whole.join(limit.range(guard_bits))
+        box |= dict.fromkeys(limit.signal.elements, whole)
+    return with_series(program, box, Fraction(1, 1 << (settings.word + 1)), _POWERS)[0]
 
 
 def _limited(signal: Signal, settings: Settings, number: NumberFormat) -> Signal:

@@ -10,7 +10,14 @@ from fractions import Fraction
 from strapgen.fixedpoint import derivation
 from strapgen.fixedpoint.accumulation import accumulation, step_errors
 from strapgen.fixedpoint.angle_accumulation import angle_accumulation
-from strapgen.fixedpoint.format_plan import FormatPlan, Limit, format_plan, limits, sums_of_inputs_are_exact
+from strapgen.fixedpoint.format_plan import (
+    MOST_GUARD_BITS,
+    FormatPlan,
+    Limit,
+    format_plan,
+    limits,
+    sums_of_inputs_are_exact,
+)
 from strapgen.fixedpoint.integer_sums import Quantization, integer_value, lower_sum, word_of
 from strapgen.fixedpoint.intervals import Interval
 from strapgen.fixedpoint.quantities import (
@@ -41,8 +48,6 @@ from strapgen.ir.interfaces import Argument, ErrorFeedback, Interface
 from strapgen.ir.program import Program, Result
 from strapgen.ir.signals import CYCLE, Signal
 
-#: Bits that inputs may be stored below their finest format, so that sums of them are exact.
-_MOST_GUARD_BITS = 3
 #: Shorter formats are chosen where they cost no more than a hundredth in error.
 _WORSE = Fraction(101, 100)
 
@@ -78,7 +83,7 @@ def _plan(program: Program, settings: Settings) -> tuple[Quantities, FormatPlan]
     # What is handed on from call to call keeps its finest format: it is no increment.
     if program.recursion is not None or sums_of_inputs_are_exact(first[1], first[0], settings.word):
         return first
-    for guard_bits in range(1, _MOST_GUARD_BITS + 1):
+    for guard_bits in range(1, MOST_GUARD_BITS + 1):
         quantities, plan = _with_guard_bits(program, settings, stated, guard_bits)
         if sums_of_inputs_are_exact(plan, quantities, settings.word):
             return quantities, plan
