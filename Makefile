@@ -145,6 +145,7 @@ bench: $(BENCH)
 	.venv-bench/bin/python benchmarks/fixed_point.py
 	.venv-bench/bin/python benchmarks/backends.py
 	.venv-bench/bin/python benchmarks/throughput.py
+	.venv-bench/bin/python benchmarks/waiting.py
 	.venv-bench/bin/python benchmarks/jacobians.py
 	.venv-bench/bin/python benchmarks/logs.py
 

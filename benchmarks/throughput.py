@@ -11,9 +11,7 @@ import argparse
 import ctypes
 import os
 import re
-import resource
 import subprocess
-import sys
 import tempfile
 import time
 from pathlib import Path
@@ -28,14 +26,6 @@ from strapgen.run.evaluators import Loop
 
 #: Runs side by side, and the steps of each.
 RUNS, STEPS = 10_000, 20
-#: A call of ``strapgen generate`` whose text is in the cache.
-GENERATE = ("generate", "euler", "--method", "rk4", "--increments", "2", "--target", "c", "--force")
-
-
-def of_children() -> float:
-    """Return the processor time of the processes that this one has started, s."""
-    used = resource.getrusage(resource.RUSAGE_CHILDREN)
-    return used.ru_utime + used.ru_stime
 
 
 def least(candidates: dict, rounds: int, clock=time.perf_counter) -> dict[str, float]:
@@ -83,6 +73,12 @@ class Loops:
             self._pointer(self._state),
         )
 
+    def batch(self, function: str) -> None:
+        """Take one step of many states by one of the functions on arrays of samples, whose order is their own."""
+        self._library["euler_rk4_2_" + function](
+            ctypes.c_size_t(RUNS), *map(self._pointer, (self._initial, self._increments, self._history))
+        )
+
     def propagate(self, runs: int, record_every: int) -> None:
         """Propagate all increments as so many runs."""
         counts = (runs, len(self._increments) // runs, record_every, 0)
@@ -114,11 +110,14 @@ def loops(rounds: int, narrow: bool = False) -> None:
                 "history": lambda: calls.propagate(1, 1),
                 "single": lambda: calls.propagate(1, len(increments)),
                 "many": lambda: calls.propagate(RUNS, STEPS),
+                "batch": lambda: calls.batch("batch"),
+                "array": lambda: calls.batch("array"),
             },
             rounds,
         )
     print("with SSE2 alone:" if narrow else "with all that the processor has:")
-    print(f"ns a step: {', '.join(f'{name} {t / len(increments) * 1e9:.2f}' for name, t in times.items())}")
+    steps = dict.fromkeys(times, len(increments)) | dict.fromkeys(("batch", "array"), RUNS)
+    print(f"ns a step: {', '.join(f'{name} {t / steps[name] * 1e9:.2f}' for name, t in times.items())}")
     show(
         "a single run with history / the bare chain of quaternion products",
         times["history"] / times["chain"],
@@ -129,6 +128,7 @@ def loops(rounds: int, narrow: bool = False) -> None:
         times["many"] / times["single"],
         None if narrow else 0.55,
     )
+    show(f"one step of {RUNS} states by element / by state", times["batch"] / times["array"])
 
 
 def series(rounds: int) -> None:
@@ -156,12 +156,21 @@ def series(rounds: int) -> None:
 def back_ends(rounds: int) -> None:
     """Print the ratios of back ends as Python calls them, checks of the inputs included."""
     c, numpy = (strapgen.backend("euler", backend=name) for name in ("c", "numpy"))
+    scan = strapgen.backend("euler", backend="c", order="scan")
     increments = np.random.default_rng(1).normal(scale=0.002, size=(RUNS * STEPS * 5, 2, 3))
     states = c.step(c.identity, increments)
     many = increments.reshape(RUNS, -1, 2, 3)
-    jobs = os.cpu_count() or 1
+    jobs, steps = os.cpu_count() or 1, len(increments)
+    memory, copy = np.zeros((1 + steps, *c.state_shape)), np.zeros_like(increments)
     times = least(
         {
+            # numpy copies so much memory by streaming stores.
+            "copy": lambda: np.copyto(copy, increments),
+            "history": lambda: c.propagate(increments, out=memory),
+            "history, scan": lambda: scan.propagate(increments, out=memory),
+            "last state": lambda: c.propagate(increments, steps),
+            "last state, scan": lambda: scan.propagate(increments, steps),
+            "many": lambda: c.propagate(many, many.shape[1]),
             "c": lambda: c.propagate(increments),
             "numpy": lambda: numpy.propagate(increments),
             "c, steps": lambda: c.step(states, increments),
@@ -170,6 +179,13 @@ def back_ends(rounds: int) -> None:
         rounds,
         time.process_time,
     )
+    print("as Python calls them:")
+    run = f"a single run of {steps} steps"
+    show(f"{run} with history / a copy of its increments", times["history"] / times["copy"], 1.7)
+    show(f"{run} with history, scan / the same copy", times["history, scan"] / times["copy"], 1.7)
+    show("scan / sequential, with history", times["history, scan"] / times["history"])
+    show("scan / sequential, last state alone", times["last state, scan"] / times["last state"])
+    show(f"one of {RUNS} runs / a single run, last states alone", times["many"] / times["last state"])
     show("numpy / C, single steps of many states", times["numpy, steps"] / times["c, steps"], 5)
     show("numpy / C, one run with history", times["numpy"] / times["c"], 5)
     times = least(
@@ -182,33 +198,6 @@ def back_ends(rounds: int) -> None:
     show(f"{jobs} threads / one, {RUNS} runs, elapsed time", times["all"] / times["one"])
 
 
-def processes(rounds: int) -> None:
-    """Print what generating from the cache takes beyond ``strapgen --help``."""
-    program = [sys.executable, "-m", "strapgen"]
-    with tempfile.TemporaryDirectory() as folder:
-        commands = {"--help": ("--help",), "generate": (*GENERATE, "--out", folder)}
-        times = least(
-            {
-                name: lambda words=words: subprocess.run(
-                    [*program, *words], check=True, stdout=subprocess.DEVNULL
-                )
-                for name, words in commands.items()
-            },
-            rounds,
-            of_children,
-        )
-        said = subprocess.run(
-            [sys.executable, "-X", "importtime", "-m", "strapgen", *GENERATE, "--out", folder],
-            check=True,
-            capture_output=True,
-            text=True,
-        ).stderr
-    show("generating from the cache less strapgen --help, s", times["generate"] - times["--help"], 0.15)
-    show("generating from the cache / strapgen --help", times["generate"] / times["--help"])
-    imported = any(line.rpartition("|")[2].strip() == "sympy" for line in said.splitlines())
-    print(f"it imports SymPy: {'yes' if imported else 'no'}")
-
-
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--rounds", type=int, default=40)
@@ -217,7 +206,6 @@ def main() -> None:
         loops(5 * options.rounds, narrow)
     series(options.rounds)
     back_ends(max(1, options.rounds // 4))
-    processes(max(1, options.rounds // 4))
 
 
 if __name__ == "__main__":

@@ -21,7 +21,7 @@ from strapgen.ir.notebook_display import short_repr
 from strapgen.ir.program import Program
 from strapgen.ir.renamed import warn
 from strapgen.ir.sources import Sources
-from strapgen.targets.names import Naming
+from strapgen.targets.naming import Naming
 
 if TYPE_CHECKING:
     from strapgen.analysis.error_analysis import ErrorAnalysis

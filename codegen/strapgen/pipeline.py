@@ -14,24 +14,24 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
-from strapgen import catalogue, fixedpoint, targets
+from strapgen import catalogue, targets
 from strapgen.catalogue import AnyAlgorithm, Choice, named
 from strapgen.ir import checks
 from strapgen.ir.checks import some
 from strapgen.ir.exceptions import InputError, InputTypeError
 from strapgen.ir.fixed_settings import Settings
-from strapgen.ir.integer_program import FixedProgram
-from strapgen.ir.program import Program
 from strapgen.ir.sources import Sources
 from strapgen.ir.timing import timed
 from strapgen.storage.cache import cached
-from strapgen.targets.names import UNNAMED, Naming
+from strapgen.targets.naming import UNNAMED, Naming
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     from strapgen.catalogue.choice import AnyMethod
+    from strapgen.ir.integer_program import FixedProgram
     from strapgen.ir.kernel_info import Description
+    from strapgen.ir.program import Program
     from strapgen.kernel.kernel import Kernel
 
 _DEFAULTS = Settings()
@@ -175,6 +175,9 @@ def quantize(program: Program, settings: Settings | None = None) -> FixedProgram
     >>> str(fixed.formats["state"]), float(fixed.error_bounds["next"] * 2**30) < 1
     ('Q1.30', True)
     """
+    from strapgen import fixedpoint
+    from strapgen.ir.program import Program
+
     checks.require("quantize", program, Program)
     _require_settings(settings)
     with timed("quantize", program.kernel):
@@ -206,6 +209,9 @@ def generate(program: Program | FixedProgram, target: str, settings: Settings | 
     >>> sorted(generate(lower(derive("euler")), "c").step_files)
     ['euler_rk4_2.c', 'euler_rk4_2.h']
     """
+    from strapgen.ir.integer_program import FixedProgram
+    from strapgen.ir.program import Program
+
     checks.require("generate", program, Program, FixedProgram)
     _require_target(target, settings)
     if isinstance(program, Program) and targets.TARGETS[target].fixed:

@@ -12,7 +12,7 @@
 /* Nonzero if the magnitude of x exceeds the limit. */
 static inline int cayley_klein_from_dcm_w32_out(int32_t x, int32_t limit)
 {
-#if defined(__GNUC__) && (defined(__ARM_ARCH_6M__) || defined(__ARM_ARCH_8M_BASE__))
+#if defined(__GNUC__) && defined(__arm__)
     return ((uint32_t)x + (uint32_t)limit) > (2u * (uint32_t)limit); /* fewer instructions there */
 #else
     return (x < -limit) || (x > limit);
@@ -126,9 +126,9 @@ int cayley_klein_from_dcm_w32(const int32_t state[9], int32_t converted[4])
     const int64_t trace = (int64_t)C_11 + (int64_t)C_22 + (int64_t)C_33;
         /* Q33.30, -3.19 .. 3.19, exact */
     const int64_t shared_1 = -trace + (INT32_C(1) << 30); /* Q33.30, -2.19 .. 4.19, exact */
-    const int64_t four_xx = (int64_t)C_11 * 2 + shared_1; /* Q33.30, -2.19 .. 4.19, exact */
-    const int64_t four_yy = (int64_t)C_22 * 2 + shared_1; /* Q33.30, -2.19 .. 4.19, exact */
-    const int64_t four_zz = (int64_t)C_33 * 2 + shared_1; /* Q33.30, -2.19 .. 4.19, exact */
+    const int64_t four_xx = shared_1 + (int64_t)C_11 * 2; /* Q33.30, -2.19 .. 4.19, exact */
+    const int64_t four_yy = shared_1 + (int64_t)C_22 * 2; /* Q33.30, -2.19 .. 4.19, exact */
+    const int64_t four_zz = shared_1 + (int64_t)C_33 * 2; /* Q33.30, -2.19 .. 4.19, exact */
     /* 4 e_s^2; the others are 4 e_x^2, 4 e_y^2, 4 e_z^2 */
     const int64_t four_ss = trace + (INT32_C(1) << 30); /* Q33.30, -2.19 .. 4.19, exact */
     const int64_t four_yz = (int64_t)C_23 + (int64_t)C_32; /* Q33.30, -2.13 .. 2.13, exact */

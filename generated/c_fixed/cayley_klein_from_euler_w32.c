@@ -12,7 +12,7 @@
 /* Nonzero if the magnitude of x exceeds the limit. */
 static inline int cayley_klein_from_euler_w32_out(int32_t x, int32_t limit)
 {
-#if defined(__GNUC__) && (defined(__ARM_ARCH_6M__) || defined(__ARM_ARCH_8M_BASE__))
+#if defined(__GNUC__) && defined(__arm__)
     return ((uint32_t)x + (uint32_t)limit) > (2u * (uint32_t)limit); /* fewer instructions there */
 #else
     return (x < -limit) || (x > limit);

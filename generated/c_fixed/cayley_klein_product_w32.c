@@ -12,7 +12,7 @@
 /* Nonzero if the magnitude of x exceeds the limit. */
 static inline int cayley_klein_product_w32_out(int32_t x, int32_t limit)
 {
-#if defined(__GNUC__) && (defined(__ARM_ARCH_6M__) || defined(__ARM_ARCH_8M_BASE__))
+#if defined(__GNUC__) && defined(__arm__)
     return ((uint32_t)x + (uint32_t)limit) > (2u * (uint32_t)limit); /* fewer instructions there */
 #else
     return (x < -limit) || (x > limit);
@@ -44,6 +44,18 @@ static inline int64_t cayley_klein_product_w32_mul(int32_t a, int32_t b)
     return (int64_t)a * (int64_t)b;
 }
 #endif
+
+/* The exact product of two words, times -1. An instruction that accumulates a product takes it
+ * with a negated factor.
+ */
+static inline int64_t cayley_klein_product_w32_nml(int32_t a, int32_t b)
+{
+#if defined(__ARM_ARCH_ISA_THUMB) && (__ARM_ARCH_ISA_THUMB > 1)
+    return cayley_klein_product_w32_mul(a, -b);
+#else
+    return -cayley_klein_product_w32_mul(a, b);
+#endif
+}
 
 /* x / 2^n, rounded down, where the proof of the ranges shows that it fits into a word: then the
  * 32 bits of x from bit n on, read as a number with a sign, are that quotient. For n above 32 the
@@ -80,20 +92,20 @@ int cayley_klein_product_w32(const int32_t state[4], const int32_t transition[4]
     const int32_t p_x = transition[1];
     const int32_t p_y = transition[2];
     const int32_t p_z = transition[3];
-    if (cayley_klein_product_w32_out(a_s, INT32_C(1140850688))
-        || cayley_klein_product_w32_out(a_x, INT32_C(1140850688))
-        || cayley_klein_product_w32_out(a_y, INT32_C(1140850688))
-        || cayley_klein_product_w32_out(a_z, INT32_C(1140850688))
-        || cayley_klein_product_w32_out(p_s, INT32_C(1140850688))
+    if (cayley_klein_product_w32_out(p_s, INT32_C(1140850688))
         || cayley_klein_product_w32_out(p_x, INT32_C(1140850688))
         || cayley_klein_product_w32_out(p_y, INT32_C(1140850688))
-        || cayley_klein_product_w32_out(p_z, INT32_C(1140850688))) {
+        || cayley_klein_product_w32_out(p_z, INT32_C(1140850688))
+        || cayley_klein_product_w32_out(a_s, INT32_C(1140850688))
+        || cayley_klein_product_w32_out(a_x, INT32_C(1140850688))
+        || cayley_klein_product_w32_out(a_y, INT32_C(1140850688))
+        || cayley_klein_product_w32_out(a_z, INT32_C(1140850688))) {
         return 1;
     }
     /* Cayley-Klein parameters, body to reference, scalar first, after the step */
     const int64_t next_s_raw = cayley_klein_product_w32_shr(cayley_klein_product_w32_mul(a_s,
-        p_s) - cayley_klein_product_w32_mul(a_x, p_x)
-        - cayley_klein_product_w32_mul(a_y, p_y) - cayley_klein_product_w32_mul(a_z, p_z)
+        p_s) + cayley_klein_product_w32_nml(p_x, a_x)
+        + cayley_klein_product_w32_nml(p_y, a_y) + cayley_klein_product_w32_nml(p_z, a_z)
         + (INT32_C(1) << 29), 30);
     if ((next_s_raw < (-INT32_C(1140850688))) || (next_s_raw > INT32_C(1140850688))) {
         return 2;
@@ -102,7 +114,7 @@ int cayley_klein_product_w32(const int32_t state[4], const int32_t transition[4]
         /* Q1.30, -1.07 .. 1.07, error 4.7e-10 */
     const int64_t next_x_raw = cayley_klein_product_w32_shr(cayley_klein_product_w32_mul(a_s,
         p_x) + cayley_klein_product_w32_mul(a_x, p_s)
-        + cayley_klein_product_w32_mul(a_y, p_z) - cayley_klein_product_w32_mul(a_z, p_y)
+        + cayley_klein_product_w32_mul(a_y, p_z) + cayley_klein_product_w32_nml(p_y, a_z)
         + (INT32_C(1) << 29), 30);
     if ((next_x_raw < (-INT32_C(1140850688))) || (next_x_raw > INT32_C(1140850688))) {
         return 2;
@@ -110,7 +122,7 @@ int cayley_klein_product_w32(const int32_t state[4], const int32_t transition[4]
     const int32_t next_x = cayley_klein_product_w32_fit(next_x_raw, 0);
         /* Q1.30, -1.07 .. 1.07, error 4.7e-10 */
     const int64_t next_y_raw = cayley_klein_product_w32_shr(cayley_klein_product_w32_mul(a_s,
-        p_y) - cayley_klein_product_w32_mul(a_x, p_z)
+        p_y) + cayley_klein_product_w32_nml(p_z, a_x)
         + cayley_klein_product_w32_mul(a_y, p_s) + cayley_klein_product_w32_mul(a_z, p_x)
         + (INT32_C(1) << 29), 30);
     if ((next_y_raw < (-INT32_C(1140850688))) || (next_y_raw > INT32_C(1140850688))) {
@@ -120,7 +132,7 @@ int cayley_klein_product_w32(const int32_t state[4], const int32_t transition[4]
         /* Q1.30, -1.07 .. 1.07, error 4.7e-10 */
     const int64_t next_z_raw = cayley_klein_product_w32_shr(cayley_klein_product_w32_mul(a_s,
         p_z) + cayley_klein_product_w32_mul(a_x, p_y)
-        - cayley_klein_product_w32_mul(a_y, p_x) + cayley_klein_product_w32_mul(a_z, p_s)
+        + cayley_klein_product_w32_nml(p_x, a_y) + cayley_klein_product_w32_mul(a_z, p_s)
         + (INT32_C(1) << 29), 30);
     if ((next_z_raw < (-INT32_C(1140850688))) || (next_z_raw > INT32_C(1140850688))) {
         return 2;

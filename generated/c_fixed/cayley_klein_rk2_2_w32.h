@@ -9,7 +9,7 @@
  * Source: MIT Measurement Systems Laboratory thesis on NASA grant NGR 22-009-229, chapter 2:
  *     dU/dt = (i/2) (w . s) U, s the Pauli matrices; rate extraction chapter 3 A; Heun's
  *     method: thesis, chapter 3 B.
- * Integer operations of one call: 39 add, 29 multiply, 10 shift; 12 temporaries.
+ * Integer operations of one call: 39 add, 29 multiply, 9 shift; 12 temporaries.
  *
  * A number in format Qm.n is an integer times 2^-n. Rounding: nearest. No intermediate sum or
  * product can overflow for inputs inside the ranges below, which every call checks; errors are

@@ -13,7 +13,7 @@
 /* Nonzero if the magnitude of x exceeds the limit. */
 static inline int cayley_klein_rk3_2_w32_out(int32_t x, int32_t limit)
 {
-#if defined(__GNUC__) && (defined(__ARM_ARCH_6M__) || defined(__ARM_ARCH_8M_BASE__))
+#if defined(__GNUC__) && defined(__arm__)
     return ((uint32_t)x + (uint32_t)limit) > (2u * (uint32_t)limit); /* fewer instructions there */
 #else
     return (x < -limit) || (x > limit);
@@ -46,6 +46,18 @@ static inline int64_t cayley_klein_rk3_2_w32_mul(int32_t a, int32_t b)
 }
 #endif
 
+/* The exact product of two words, times -1. An instruction that accumulates a product takes it
+ * with a negated factor.
+ */
+static inline int64_t cayley_klein_rk3_2_w32_nml(int32_t a, int32_t b)
+{
+#if defined(__ARM_ARCH_ISA_THUMB) && (__ARM_ARCH_ISA_THUMB > 1)
+    return cayley_klein_rk3_2_w32_mul(a, -b);
+#else
+    return -cayley_klein_rk3_2_w32_mul(a, b);
+#endif
+}
+
 /* The exact square of a word. */
 static inline int64_t cayley_klein_rk3_2_w32_sqr(int32_t a)
 {
@@ -75,6 +87,27 @@ static inline int32_t cayley_klein_rk3_2_w32_fit(int64_t x, int n)
 #endif
 }
 
+/* x / 2^32, to the nearest, where the proof of the ranges shows that it fits into a word: the high
+ * word of x, and one more if the first bit of the low one is set.
+ */
+static inline int32_t cayley_klein_rk3_2_w32_near(int64_t x)
+{
+#ifdef __FRAMAC__
+    const int64_t moved = x + INT64_C(2147483648);
+    return (int32_t)((moved < 0) ? ~(~moved >> 32) : (moved >> 32));
+#else
+    const uint32_t carry = (uint32_t)x >> 31;
+    const uint32_t bits = (uint32_t)((uint64_t)x >> 32) + carry;
+    return (bits <= (UINT32_MAX >> 1)) ? (int32_t)bits : (-1 - (int32_t)(UINT32_MAX - bits));
+#endif
+}
+
+/* x / 2^n of a word, rounded down. */
+static inline int32_t cayley_klein_rk3_2_w32_asr(int32_t x, int n)
+{
+    return (x >= 0) ? (x >> n) : ~(~x >> n);
+}
+
 /* x / 2^n, rounded down, as a wide number. */
 static inline int64_t cayley_klein_rk3_2_w32_shr(int64_t x, int n)
 {
@@ -93,16 +126,16 @@ int cayley_klein_rk3_2_w32(const int32_t state[4], const int32_t increments[6], 
     const int32_t d2_x = increments[3];
     const int32_t d2_y = increments[4];
     const int32_t d2_z = increments[5];
-    if (cayley_klein_rk3_2_w32_out(a_s, INT32_C(1140850688))
-        || cayley_klein_rk3_2_w32_out(a_x, INT32_C(1140850688))
-        || cayley_klein_rk3_2_w32_out(a_y, INT32_C(1140850688))
-        || cayley_klein_rk3_2_w32_out(a_z, INT32_C(1140850688))
-        || cayley_klein_rk3_2_w32_out(d1_x, (INT32_C(1) << 29))
+    if (cayley_klein_rk3_2_w32_out(d1_x, (INT32_C(1) << 29))
         || cayley_klein_rk3_2_w32_out(d1_y, (INT32_C(1) << 29))
         || cayley_klein_rk3_2_w32_out(d1_z, (INT32_C(1) << 29))
         || cayley_klein_rk3_2_w32_out(d2_x, (INT32_C(1) << 29))
         || cayley_klein_rk3_2_w32_out(d2_y, (INT32_C(1) << 29))
-        || cayley_klein_rk3_2_w32_out(d2_z, (INT32_C(1) << 29))) {
+        || cayley_klein_rk3_2_w32_out(d2_z, (INT32_C(1) << 29))
+        || cayley_klein_rk3_2_w32_out(a_s, INT32_C(1140850688))
+        || cayley_klein_rk3_2_w32_out(a_x, INT32_C(1140850688))
+        || cayley_klein_rk3_2_w32_out(a_y, INT32_C(1140850688))
+        || cayley_klein_rk3_2_w32_out(a_z, INT32_C(1140850688))) {
         return 1;
     }
     /* the angle increment of the whole step */
@@ -114,13 +147,13 @@ int cayley_klein_rk3_2_w32(const int32_t state[4], const int32_t increments[6], 
     const int32_t delta_y = d1_y - d2_y; /* Q-1.32, -0.25 .. 0.25, exact */
     const int32_t delta_z = d1_z - d2_z; /* Q-1.32, -0.25 .. 0.25, exact */
     const int32_t delta_cross_sigma_x = cayley_klein_rk3_2_w32_fit(cayley_klein_rk3_2_w32_mul(
-        delta_y, sigma_z) - cayley_klein_rk3_2_w32_mul(delta_z, sigma_y)
+        delta_y, sigma_z) + cayley_klein_rk3_2_w32_nml(sigma_y, delta_z)
         + (INT32_C(1) << 29), 30); /* Q-3.34, -0.0626 .. 0.0626, error 3e-11 */
     const int32_t delta_cross_sigma_y = cayley_klein_rk3_2_w32_fit(cayley_klein_rk3_2_w32_mul(
-        delta_z, sigma_x) - cayley_klein_rk3_2_w32_mul(delta_x, sigma_z)
+        delta_z, sigma_x) + cayley_klein_rk3_2_w32_nml(sigma_z, delta_x)
         + (INT32_C(1) << 29), 30); /* Q-3.34, -0.0626 .. 0.0626, error 3e-11 */
     const int32_t delta_cross_sigma_z = cayley_klein_rk3_2_w32_fit(cayley_klein_rk3_2_w32_mul(
-        delta_x, sigma_y) - cayley_klein_rk3_2_w32_mul(delta_y, sigma_x)
+        delta_x, sigma_y) + cayley_klein_rk3_2_w32_nml(sigma_x, delta_y)
         + (INT32_C(1) << 29), 30); /* Q-3.34, -0.0626 .. 0.0626, error 3e-11 */
     const int32_t delta_dot_delta = cayley_klein_rk3_2_w32_fit(cayley_klein_rk3_2_w32_sqr(
         delta_x) + cayley_klein_rk3_2_w32_sqr(delta_y) + cayley_klein_rk3_2_w32_sqr(delta_z)
@@ -129,10 +162,10 @@ int cayley_klein_rk3_2_w32(const int32_t state[4], const int32_t increments[6], 
         sigma_x) + cayley_klein_rk3_2_w32_sqr(sigma_y) + cayley_klein_rk3_2_w32_sqr(sigma_z)
         + (INT32_C(1) << 30), 31); /* Q-2.33, -1.17e-10 .. 0.188, error 5.9e-11 */
     /* weight of sigma in p */
-    const int32_t p_sigma = cayley_klein_rk3_2_w32_fit(-cayley_klein_rk3_2_w32_mul(
-        delta_dot_delta, INT32_C(1431655765) /* 1/12 in Q34 */) * 2
-        + cayley_klein_rk3_2_w32_shr(-cayley_klein_rk3_2_w32_mul(sigma_dot_sigma,
-        INT32_C(1431655765) /* 1/48 in Q36 */), 1) + (INT64_C(1) << 31), 32);
+    const int32_t p_sigma = cayley_klein_rk3_2_w32_near(cayley_klein_rk3_2_w32_mul(
+        delta_dot_delta, (-INT32_C(1431655765)) /* -1/12 in Q34 */) * 2
+        + cayley_klein_rk3_2_w32_shr(cayley_klein_rk3_2_w32_mul(sigma_dot_sigma,
+        (-INT32_C(1431655765)) /* -1/48 in Q36 */), 1));
         /* Q-5.36, -0.0157 .. 2.92e-11, error 1.8e-11; stores p_sigma - 1/2 */
     const int32_t sigma_dot_delta = cayley_klein_rk3_2_w32_fit(cayley_klein_rk3_2_w32_mul(
         delta_x, sigma_x) + cayley_klein_rk3_2_w32_mul(delta_y, sigma_y)
@@ -143,46 +176,47 @@ int cayley_klein_rk3_2_w32(const int32_t state[4], const int32_t increments[6], 
         sigma_dot_delta, INT32_C(1431655765) /* 1/6 in Q33 */) + (INT32_C(1) << 30), 31);
         /* Q-6.37, -0.00782 .. 0.00782, error 7.9e-12 */
     /* the step applied to the identity: its vector part */
-    const int32_t p_x = sigma_x
-        + cayley_klein_rk3_2_w32_fit(cayley_klein_rk3_2_w32_mul(p_sigma, sigma_x)
+    const int32_t p_x = sigma_x + cayley_klein_rk3_2_w32_asr(cayley_klein_rk3_2_w32_fit(
+        cayley_klein_rk3_2_w32_mul(p_sigma, sigma_x)
         + cayley_klein_rk3_2_w32_shr(cayley_klein_rk3_2_w32_mul(delta_x, p_delta), 1)
         + cayley_klein_rk3_2_w32_mul(delta_cross_sigma_x,
-        INT32_C(1431655765) /* 1/6 in Q33 */) * 2 + (INT64_C(1) << 34), 35);
+        INT32_C(1431655765) /* 1/6 in Q33 */) * 2, 32) + 4, 3);
         /* Q-2.33, -0.142 .. 0.142, error 7.2e-11 */
-    const int32_t p_y = sigma_y
-        + cayley_klein_rk3_2_w32_fit(cayley_klein_rk3_2_w32_mul(p_sigma, sigma_y)
+    const int32_t p_y = sigma_y + cayley_klein_rk3_2_w32_asr(cayley_klein_rk3_2_w32_fit(
+        cayley_klein_rk3_2_w32_mul(p_sigma, sigma_y)
         + cayley_klein_rk3_2_w32_shr(cayley_klein_rk3_2_w32_mul(delta_y, p_delta), 1)
         + cayley_klein_rk3_2_w32_mul(delta_cross_sigma_y,
-        INT32_C(1431655765) /* 1/6 in Q33 */) * 2 + (INT64_C(1) << 34), 35);
+        INT32_C(1431655765) /* 1/6 in Q33 */) * 2, 32) + 4, 3);
         /* Q-2.33, -0.142 .. 0.142, error 7.2e-11 */
-    const int32_t p_z = sigma_z
-        + cayley_klein_rk3_2_w32_fit(cayley_klein_rk3_2_w32_mul(p_sigma, sigma_z)
+    const int32_t p_z = sigma_z + cayley_klein_rk3_2_w32_asr(cayley_klein_rk3_2_w32_fit(
+        cayley_klein_rk3_2_w32_mul(p_sigma, sigma_z)
         + cayley_klein_rk3_2_w32_shr(cayley_klein_rk3_2_w32_mul(delta_z, p_delta), 1)
         + cayley_klein_rk3_2_w32_mul(delta_cross_sigma_z,
-        INT32_C(1431655765) /* 1/6 in Q33 */) * 2 + (INT64_C(1) << 34), 35);
+        INT32_C(1431655765) /* 1/6 in Q33 */) * 2, 32) + 4, 3);
         /* Q-2.33, -0.142 .. 0.142, error 7.2e-11 */
     /* its scalar part */
-    const int32_t p_s = cayley_klein_rk3_2_w32_fit(-cayley_klein_rk3_2_w32_mul(delta_dot_delta,
-        INT32_C(1431655765) /* 1/6 in Q33 */)
-        - (int64_t)sigma_dot_sigma * (INT32_C(1) << 30) + (INT64_C(1) << 32), 33);
+    const int32_t p_s = cayley_klein_rk3_2_w32_asr(cayley_klein_rk3_2_w32_fit(
+        cayley_klein_rk3_2_w32_mul(delta_dot_delta,
+        (-INT32_C(1431655765)) /* -1/6 in Q33 */)
+        - (int64_t)sigma_dot_sigma * (INT32_C(1) << 30), 32) + 1, 1);
         /* Q-2.33, -0.0313 .. 1.17e-10, error 8.3e-11; stores p_s - 1 */
     /* Cayley-Klein parameters, body to reference, scalar first, after the step */
-    const int32_t next_s = a_s + cayley_klein_rk3_2_w32_fit(cayley_klein_rk3_2_w32_mul(a_s, p_s)
-        - cayley_klein_rk3_2_w32_mul(a_x, p_x) - cayley_klein_rk3_2_w32_mul(a_y, p_y)
-        - cayley_klein_rk3_2_w32_mul(a_z, p_z) + (INT64_C(1) << 32), 33);
-        /* Q1.30, -1.55 .. 1.55, error 7.9e-10 */
-    const int32_t next_x = a_x + cayley_klein_rk3_2_w32_fit(cayley_klein_rk3_2_w32_mul(a_s, p_x)
-        + cayley_klein_rk3_2_w32_mul(a_x, p_s) + cayley_klein_rk3_2_w32_mul(a_y, p_z)
-        - cayley_klein_rk3_2_w32_mul(a_z, p_y) + (INT64_C(1) << 32), 33);
-        /* Q1.30, -1.55 .. 1.55, error 7.9e-10 */
-    const int32_t next_y = a_y + cayley_klein_rk3_2_w32_fit(cayley_klein_rk3_2_w32_mul(a_s, p_y)
-        - cayley_klein_rk3_2_w32_mul(a_x, p_z) + cayley_klein_rk3_2_w32_mul(a_y, p_s)
-        + cayley_klein_rk3_2_w32_mul(a_z, p_x) + (INT64_C(1) << 32), 33);
-        /* Q1.30, -1.55 .. 1.55, error 7.9e-10 */
-    const int32_t next_z = a_z + cayley_klein_rk3_2_w32_fit(cayley_klein_rk3_2_w32_mul(a_s, p_z)
-        + cayley_klein_rk3_2_w32_mul(a_x, p_y) - cayley_klein_rk3_2_w32_mul(a_y, p_x)
-        + cayley_klein_rk3_2_w32_mul(a_z, p_s) + (INT64_C(1) << 32), 33);
-        /* Q1.30, -1.55 .. 1.55, error 7.9e-10 */
+    const int32_t next_s = a_s + cayley_klein_rk3_2_w32_asr(cayley_klein_rk3_2_w32_fit(
+        cayley_klein_rk3_2_w32_mul(a_s, p_s) + cayley_klein_rk3_2_w32_nml(a_x, p_x)
+        + cayley_klein_rk3_2_w32_nml(a_y, p_y) + cayley_klein_rk3_2_w32_nml(a_z, p_z), 32)
+        + 1, 1); /* Q1.30, -1.55 .. 1.55, error 7.9e-10 */
+    const int32_t next_x = a_x + cayley_klein_rk3_2_w32_asr(cayley_klein_rk3_2_w32_fit(
+        cayley_klein_rk3_2_w32_mul(a_s, p_x) + cayley_klein_rk3_2_w32_mul(a_x, p_s)
+        + cayley_klein_rk3_2_w32_mul(a_y, p_z) + cayley_klein_rk3_2_w32_nml(a_z, p_y), 32)
+        + 1, 1); /* Q1.30, -1.55 .. 1.55, error 7.9e-10 */
+    const int32_t next_y = a_y + cayley_klein_rk3_2_w32_asr(cayley_klein_rk3_2_w32_fit(
+        cayley_klein_rk3_2_w32_mul(a_s, p_y) + cayley_klein_rk3_2_w32_nml(a_x, p_z)
+        + cayley_klein_rk3_2_w32_mul(a_y, p_s) + cayley_klein_rk3_2_w32_mul(a_z, p_x), 32)
+        + 1, 1); /* Q1.30, -1.55 .. 1.55, error 7.9e-10 */
+    const int32_t next_z = a_z + cayley_klein_rk3_2_w32_asr(cayley_klein_rk3_2_w32_fit(
+        cayley_klein_rk3_2_w32_mul(a_s, p_z) + cayley_klein_rk3_2_w32_mul(a_x, p_y)
+        + cayley_klein_rk3_2_w32_nml(a_y, p_x) + cayley_klein_rk3_2_w32_mul(a_z, p_s), 32)
+        + 1, 1); /* Q1.30, -1.55 .. 1.55, error 7.9e-10 */
     next[0] = next_s;
     next[1] = next_x;
     next[2] = next_y;

@@ -12,7 +12,7 @@
 /* Nonzero if the magnitude of x exceeds the limit. */
 static inline int coning_fast_w32_out(int32_t x, int32_t limit)
 {
-#if defined(__GNUC__) && (defined(__ARM_ARCH_6M__) || defined(__ARM_ARCH_8M_BASE__))
+#if defined(__GNUC__) && defined(__arm__)
     return ((uint32_t)x + (uint32_t)limit) > (2u * (uint32_t)limit); /* fewer instructions there */
 #else
     return (x < -limit) || (x > limit);
@@ -45,6 +45,18 @@ static inline int64_t coning_fast_w32_mul(int32_t a, int32_t b)
 }
 #endif
 
+/* The exact product of two words, times -1. An instruction that accumulates a product takes it
+ * with a negated factor.
+ */
+static inline int64_t coning_fast_w32_nml(int32_t a, int32_t b)
+{
+#if defined(__ARM_ARCH_ISA_THUMB) && (__ARM_ARCH_ISA_THUMB > 1)
+    return coning_fast_w32_mul(a, -b);
+#else
+    return -coning_fast_w32_mul(a, b);
+#endif
+}
+
 /* x / 2^n, rounded down, where the proof of the ranges shows that it fits into a word: then the
  * 32 bits of x from bit n on, read as a number with a sign, are that quotient. For n above 32 the
  * high word of x is shifted on. Nothing is left to the compiler: no right shift of a negative
@@ -62,6 +74,27 @@ static inline int32_t coning_fast_w32_fit(int64_t x, int n)
                                                  : (-1 - (int32_t)(UINT32_MAX - bits));
     return (high < 0) ? ~(~high >> beyond) : (high >> beyond);
 #endif
+}
+
+/* x / 2^32, to the nearest, where the proof of the ranges shows that it fits into a word: the high
+ * word of x, and one more if the first bit of the low one is set.
+ */
+static inline int32_t coning_fast_w32_near(int64_t x)
+{
+#ifdef __FRAMAC__
+    const int64_t moved = x + INT64_C(2147483648);
+    return (int32_t)((moved < 0) ? ~(~moved >> 32) : (moved >> 32));
+#else
+    const uint32_t carry = (uint32_t)x >> 31;
+    const uint32_t bits = (uint32_t)((uint64_t)x >> 32) + carry;
+    return (bits <= (UINT32_MAX >> 1)) ? (int32_t)bits : (-1 - (int32_t)(UINT32_MAX - bits));
+#endif
+}
+
+/* x / 2^n of a word, rounded down. */
+static inline int32_t coning_fast_w32_asr(int32_t x, int n)
+{
+    return (x >= 0) ? (x >> n) : ~(~x >> n);
 }
 
 /* x / 2^n, rounded down, as a wide number. */
@@ -86,44 +119,46 @@ int coning_fast_w32(const int32_t angle_sum[3], const int32_t coning[3],
     const int32_t d_x = increment[0];
     const int32_t d_y = increment[1];
     const int32_t d_z = increment[2];
-    if (coning_fast_w32_out(beta_x, (INT32_C(1) << 30))
-        || coning_fast_w32_out(beta_y, (INT32_C(1) << 30))
-        || coning_fast_w32_out(beta_z, (INT32_C(1) << 30))
-        || coning_fast_w32_out(coning_x, (INT32_C(1) << 30))
-        || coning_fast_w32_out(coning_y, (INT32_C(1) << 30))
-        || coning_fast_w32_out(coning_z, (INT32_C(1) << 30))
+    if (coning_fast_w32_out(d_x, (INT32_C(1) << 30))
+        || coning_fast_w32_out(d_y, (INT32_C(1) << 30))
+        || coning_fast_w32_out(d_z, (INT32_C(1) << 30))
         || coning_fast_w32_out(past_x, (INT32_C(1) << 30))
         || coning_fast_w32_out(past_y, (INT32_C(1) << 30))
         || coning_fast_w32_out(past_z, (INT32_C(1) << 30))
-        || coning_fast_w32_out(d_x, (INT32_C(1) << 30))
-        || coning_fast_w32_out(d_y, (INT32_C(1) << 30))
-        || coning_fast_w32_out(d_z, (INT32_C(1) << 30))) {
+        || coning_fast_w32_out(coning_x, (INT32_C(1) << 30))
+        || coning_fast_w32_out(coning_y, (INT32_C(1) << 30))
+        || coning_fast_w32_out(coning_z, (INT32_C(1) << 30))
+        || coning_fast_w32_out(beta_x, (INT32_C(1) << 30))
+        || coning_fast_w32_out(beta_y, (INT32_C(1) << 30))
+        || coning_fast_w32_out(beta_z, (INT32_C(1) << 30))) {
         return 1;
     }
     /* angle at the middle of the cycle, for coning */
-    const int32_t arm_x = beta_x + coning_fast_w32_fit(coning_fast_w32_mul(past_x,
-        INT32_C(1431655765) /* 1/6 in Q33 */) + (INT64_C(1) << 35), 36);
+    const int32_t arm_x = beta_x
+        + coning_fast_w32_asr(coning_fast_w32_fit(coning_fast_w32_mul(past_x,
+        INT32_C(1431655765) /* 1/6 in Q33 */), 32) + 8, 4);
         /* Q1.30, -1.03 .. 1.03, error 4.8e-10 */
-    const int32_t arm_y = beta_y + coning_fast_w32_fit(coning_fast_w32_mul(past_y,
-        INT32_C(1431655765) /* 1/6 in Q33 */) + (INT64_C(1) << 35), 36);
+    const int32_t arm_y = beta_y
+        + coning_fast_w32_asr(coning_fast_w32_fit(coning_fast_w32_mul(past_y,
+        INT32_C(1431655765) /* 1/6 in Q33 */), 32) + 8, 4);
         /* Q1.30, -1.03 .. 1.03, error 4.8e-10 */
     const int64_t arm_z = (int64_t)beta_z * (INT64_C(1) << 32)
         + coning_fast_w32_shr(coning_fast_w32_mul(past_z,
         INT32_C(1431655765) /* 1/6 in Q33 */), 4); /* Q1.62, -1.03 .. 1.03, error 4.9e-12 */
     /* sum of the angle increments since the slow cycle began, after the call */
-    const int32_t next_beta_x = beta_x + coning_fast_w32_fit((int64_t)d_x + 4, 3);
+    const int32_t next_beta_x = beta_x + coning_fast_w32_asr(d_x + 4, 3);
         /* Q1.30, -1.13 .. 1.13, error 4.7e-10 */
-    const int32_t next_beta_y = beta_y + coning_fast_w32_fit((int64_t)d_y + 4, 3);
+    const int32_t next_beta_y = beta_y + coning_fast_w32_asr(d_y + 4, 3);
         /* Q1.30, -1.13 .. 1.13, error 4.7e-10 */
-    const int32_t next_beta_z = beta_z + coning_fast_w32_fit((int64_t)d_z + 4, 3);
+    const int32_t next_beta_z = beta_z + coning_fast_w32_asr(d_z + 4, 3);
         /* Q1.30, -1.13 .. 1.13, error 4.7e-10 */
     const int32_t shared_1 = d_z; /* Q-3.34, -0.0625 .. 0.0625, exact */
-    const int32_t shared_2 = coning_fast_w32_fit(arm_z + (INT64_C(1) << 31), 32);
+    const int32_t shared_2 = coning_fast_w32_near(arm_z);
         /* Q0.31, -0.511 .. 0.511, error 2.4e-10 */
     /* coning correction since the slow cycle began, after the call */
     const int64_t next_coning_x_raw = (int64_t)coning_x
         + coning_fast_w32_shr(coning_fast_w32_mul(arm_y, shared_1)
-        - coning_fast_w32_mul(d_y, shared_2) + (INT32_C(1) << 30), 31);
+        + coning_fast_w32_nml(d_y, shared_2) + (INT32_C(1) << 30), 31);
     if ((next_coning_x_raw < (-(INT32_C(1) << 30)))
         || (next_coning_x_raw > (INT32_C(1) << 30))) {
         return 2;
@@ -131,7 +166,7 @@ int coning_fast_w32(const int32_t angle_sum[3], const int32_t coning[3],
     const int32_t next_coning_x = coning_fast_w32_fit(next_coning_x_raw, 0);
         /* Q-2.33, -0.125 .. 0.125, error 1.2e-10 */
     const int64_t next_coning_y_raw = (int64_t)coning_y
-        + coning_fast_w32_shr(-coning_fast_w32_mul(arm_x, shared_1)
+        + coning_fast_w32_shr(coning_fast_w32_nml(shared_1, arm_x)
         + coning_fast_w32_mul(d_x, shared_2) + (INT32_C(1) << 30), 31);
     if ((next_coning_y_raw < (-(INT32_C(1) << 30)))
         || (next_coning_y_raw > (INT32_C(1) << 30))) {
@@ -141,7 +176,7 @@ int coning_fast_w32(const int32_t angle_sum[3], const int32_t coning[3],
         /* Q-2.33, -0.125 .. 0.125, error 1.2e-10 */
     const int64_t next_coning_z_raw = (int64_t)coning_z
         + coning_fast_w32_shr(coning_fast_w32_mul(arm_x, d_y)
-        - coning_fast_w32_mul(arm_y, d_x) + (INT32_C(1) << 30), 31);
+        + coning_fast_w32_nml(d_x, arm_y) + (INT32_C(1) << 30), 31);
     if ((next_coning_z_raw < (-(INT32_C(1) << 30)))
         || (next_coning_z_raw > (INT32_C(1) << 30))) {
         return 2;

@@ -12,7 +12,7 @@
 /* Nonzero if the magnitude of x exceeds the limit. */
 static inline int dcm_from_euler_angles_w32_out(int32_t x, int32_t limit)
 {
-#if defined(__GNUC__) && (defined(__ARM_ARCH_6M__) || defined(__ARM_ARCH_8M_BASE__))
+#if defined(__GNUC__) && defined(__arm__)
     return ((uint32_t)x + (uint32_t)limit) > (2u * (uint32_t)limit); /* fewer instructions there */
 #else
     return (x < -limit) || (x > limit);
@@ -74,6 +74,21 @@ static inline int32_t dcm_from_euler_angles_w32_fit(int64_t x, int n)
 #endif
 }
 
+/* x / 2^32, to the nearest, where the proof of the ranges shows that it fits into a word: the high
+ * word of x, and one more if the first bit of the low one is set.
+ */
+static inline int32_t dcm_from_euler_angles_w32_near(int64_t x)
+{
+#ifdef __FRAMAC__
+    const int64_t moved = x + INT64_C(2147483648);
+    return (int32_t)((moved < 0) ? ~(~moved >> 32) : (moved >> 32));
+#else
+    const uint32_t carry = (uint32_t)x >> 31;
+    const uint32_t bits = (uint32_t)((uint64_t)x >> 32) + carry;
+    return (bits <= (UINT32_MAX >> 1)) ? (int32_t)bits : (-1 - (int32_t)(UINT32_MAX - bits));
+#endif
+}
+
 /* x / 2^n, rounded down, as a wide number. */
 static inline int64_t dcm_from_euler_angles_w32_shr(int64_t x, int n)
 {
@@ -94,10 +109,10 @@ int dcm_from_euler_angles_w32(const int32_t angles[3], int32_t attitude[9])
         dcm_from_euler_angles_w32_mul(heading, INT32_C(1367130551))
         + (INT64_C(1) << 59), 60); /* Q31.0, -2 .. 2, exact */
     const int32_t cos_heading_rest = dcm_from_euler_angles_w32_fit((int64_t)heading * 4
-        + dcm_from_euler_angles_w32_shr(-dcm_from_euler_angles_w32_mul(cos_heading_quarters,
-        INT32_C(560513589)) + (INT64_C(1) << 31), 32)
-        - dcm_from_euler_angles_w32_mul(cos_heading_quarters, INT32_C(1686629713)) * 2, 0);
-        /* Q0.31, -0.786 .. 0.786, error 2.4e-10 */
+        + dcm_from_euler_angles_w32_shr(dcm_from_euler_angles_w32_mul(cos_heading_quarters,
+        (-INT32_C(560513589))) + (INT64_C(1) << 31), 32)
+        + dcm_from_euler_angles_w32_mul(cos_heading_quarters, (-INT32_C(1686629713)))
+        * 2, 0); /* Q0.31, -0.786 .. 0.786, error 2.4e-10 */
     const int32_t cos_heading_turns = dcm_from_euler_angles_w32_fit(
         (int64_t)cos_heading_quarters + 2, 2); /* Q31.0, 0 .. 1, exact */
     const int64_t cos_heading_quarter_turns = (int64_t)cos_heading_quarters
@@ -105,42 +120,42 @@ int dcm_from_euler_angles_w32(const int32_t angles[3], int32_t attitude[9])
     const int32_t cos_heading_square = dcm_from_euler_angles_w32_fit(
         dcm_from_euler_angles_w32_sqr(cos_heading_rest) + (INT32_C(1) << 30), 31);
         /* Q0.31, -9.32e-10 .. 0.617, error 6e-10 */
-    const int32_t cos_heading_series = dcm_from_euler_angles_w32_fit(
-        dcm_from_euler_angles_w32_shr(-dcm_from_euler_angles_w32_mul(cos_heading_square,
-        INT32_C(56412333) /* 1/39916800 in Q51 */), 1)
-        + INT64_C(6662950945848033280) /* 1/362880 in Q60 */ + (INT64_C(1) << 31), 32);
+    const int32_t cos_heading_series = dcm_from_euler_angles_w32_near(
+        dcm_from_euler_angles_w32_shr(dcm_from_euler_angles_w32_mul(cos_heading_square,
+        (-INT32_C(56412333)) /* -1/39916800 in Q51 */), 1)
+        + INT64_C(6662950945848033280) /* 1/362880 in Q60 */);
         /* 2.74e-06 .. 2.76e-06, error 9.1e-16 */
-    const int32_t cos_heading_series_2 = dcm_from_euler_angles_w32_fit(
+    const int32_t cos_heading_series_2 = dcm_from_euler_angles_w32_near(
         dcm_from_euler_angles_w32_shr(dcm_from_euler_angles_w32_mul(cos_heading_square,
-        cos_heading_series), 5) - INT64_C(7495819814078808064) /* 1/5040 in Q60 */
-        + (INT64_C(1) << 31), 32); /* Q-12.43, -0.000199 .. -0.000196, error 6e-14 */
-    const int32_t cos_heading_series_3 = dcm_from_euler_angles_w32_fit(
+        cos_heading_series), 5) - INT64_C(7495819814078808064) /* 1/5040 in Q60 */);
+        /* Q-12.43, -0.000199 .. -0.000196, error 6e-14 */
+    const int32_t cos_heading_series_3 = dcm_from_euler_angles_w32_near(
         dcm_from_euler_angles_w32_shr(dcm_from_euler_angles_w32_mul(cos_heading_square,
-        cos_heading_series_2), 5) + INT64_C(4919131752989213696) /* 1/120 in Q60 */
-        + (INT64_C(1) << 31), 32); /* 0.00821 .. 0.00834, error 3.8e-12 */
-    const int32_t cos_heading_series_4 = dcm_from_euler_angles_w32_fit(
+        cos_heading_series_2), 5) + INT64_C(4919131752989213696) /* 1/120 in Q60 */);
+        /* 0.00821 .. 0.00834, error 3.8e-12 */
+    const int32_t cos_heading_series_4 = dcm_from_euler_angles_w32_near(
         dcm_from_euler_angles_w32_shr(dcm_from_euler_angles_w32_mul(cos_heading_square,
-        cos_heading_series_3), 3) - INT64_C(6148914691236517216) /* 1/6 in Q60 */
-        + (INT64_C(1) << 31), 32); /* Q-2.33, -0.167 .. -0.161, error 6.6e-11 */
+        cos_heading_series_3), 3) - INT64_C(6148914691236517216) /* 1/6 in Q60 */);
+        /* Q-2.33, -0.167 .. -0.161, error 6.6e-11 */
     const int32_t cos_heading_bend = dcm_from_euler_angles_w32_fit(
         dcm_from_euler_angles_w32_mul(cos_heading_square, cos_heading_series_4)
         + (INT32_C(1) << 29), 30); /* Q-3.34, -0.103 .. 1.75e-10, error 1.7e-10 */
     const int64_t cos_heading_sine = (int64_t)cos_heading_rest * (INT64_C(1) << 32)
         + dcm_from_euler_angles_w32_shr(dcm_from_euler_angles_w32_mul(cos_heading_rest,
         cos_heading_bend), 2); /* Q0.63, -0.786 .. 0.786, error 4e-10 */
-    const int32_t cos_heading_series_5 = dcm_from_euler_angles_w32_fit(
-        dcm_from_euler_angles_w32_shr(-dcm_from_euler_angles_w32_mul(cos_heading_square,
-        INT32_C(620535663) /* 1/3628800 in Q51 */), 4)
-        + INT64_C(7495819814078775296) /* 1/40320 in Q60 */ + (INT64_C(1) << 31), 32);
+    const int32_t cos_heading_series_5 = dcm_from_euler_angles_w32_near(
+        dcm_from_euler_angles_w32_shr(dcm_from_euler_angles_w32_mul(cos_heading_square,
+        (-INT32_C(620535663)) /* -1/3628800 in Q51 */), 4)
+        + INT64_C(7495819814078775296) /* 1/40320 in Q60 */);
         /* 2.46e-05 .. 2.49e-05, error 7.3e-15 */
-    const int32_t cos_heading_series_6 = dcm_from_euler_angles_w32_fit(
+    const int32_t cos_heading_series_6 = dcm_from_euler_angles_w32_near(
         dcm_from_euler_angles_w32_shr(dcm_from_euler_angles_w32_mul(cos_heading_square,
-        cos_heading_series_5), 5) - INT64_C(6558842337318952960) /* 1/720 in Q60 */
-        + (INT64_C(1) << 31), 32); /* Q-9.40, -0.00139 .. -0.00137, error 4.8e-13 */
-    const int32_t cos_heading_series_7 = dcm_from_euler_angles_w32_fit(
+        cos_heading_series_5), 5) - INT64_C(6558842337318952960) /* 1/720 in Q60 */);
+        /* Q-9.40, -0.00139 .. -0.00137, error 4.8e-13 */
+    const int32_t cos_heading_series_7 = dcm_from_euler_angles_w32_near(
         dcm_from_euler_angles_w32_shr(dcm_from_euler_angles_w32_mul(cos_heading_square,
-        cos_heading_series_6), 4) + INT64_C(6148914691236517248) /* 1/24 in Q60 */
-        + (INT64_C(1) << 31), 32); /* 0.0408 .. 0.0417, error 1.6e-11 */
+        cos_heading_series_6), 4) + INT64_C(6148914691236517248) /* 1/24 in Q60 */);
+        /* 0.0408 .. 0.0417, error 1.6e-11 */
     const int32_t cos_heading_bend_2 = dcm_from_euler_angles_w32_fit(
         dcm_from_euler_angles_w32_mul(cos_heading_square, cos_heading_series_7)
         + (INT32_C(1) << 29), 30); /* Q-5.36, -4.37e-11 .. 0.0258, error 4.2e-11 */
@@ -161,8 +176,8 @@ int dcm_from_euler_angles_w32(const int32_t angles[3], int32_t attitude[9])
     } else {
         cos_heading_quarter = cos_heading_opposite_2;
     }
-    const int32_t cos_heading = dcm_from_euler_angles_w32_fit(cos_heading_quarter
-        + (INT64_C(1) << 31), 32); /* Q1.30, -1.01 .. 1.01, error 9.3e-10 */
+    const int32_t cos_heading = dcm_from_euler_angles_w32_near(cos_heading_quarter);
+        /* Q1.30, -1.01 .. 1.01, error 9.3e-10 */
     int64_t sin_heading_quarter; /* Q1.62, -1.01 .. 1.01, error 4.6e-10 */
     if (cos_heading_quarter_turns >= 1) {
         sin_heading_quarter = cos_heading_cosine;
@@ -173,15 +188,15 @@ int dcm_from_euler_angles_w32(const int32_t angles[3], int32_t attitude[9])
     } else {
         sin_heading_quarter = dcm_from_euler_angles_w32_shr(cos_heading_opposite, 1);
     }
-    const int32_t sin_heading = dcm_from_euler_angles_w32_fit(sin_heading_quarter
-        + (INT64_C(1) << 31), 32); /* Q1.30, -1.01 .. 1.01, error 9.3e-10 */
+    const int32_t sin_heading = dcm_from_euler_angles_w32_near(sin_heading_quarter);
+        /* Q1.30, -1.01 .. 1.01, error 9.3e-10 */
     const int32_t cos_pitch_quarters = dcm_from_euler_angles_w32_fit(
         dcm_from_euler_angles_w32_mul(pitch, INT32_C(1367130551)) + (INT64_C(1) << 59), 60);
         /* Q31.0, -2 .. 2, exact */
     const int32_t cos_pitch_rest = dcm_from_euler_angles_w32_fit((int64_t)pitch * 4
-        + dcm_from_euler_angles_w32_shr(-dcm_from_euler_angles_w32_mul(cos_pitch_quarters,
-        INT32_C(560513589)) + (INT64_C(1) << 31), 32)
-        - dcm_from_euler_angles_w32_mul(cos_pitch_quarters, INT32_C(1686629713)) * 2, 0);
+        + dcm_from_euler_angles_w32_shr(dcm_from_euler_angles_w32_mul(cos_pitch_quarters,
+        (-INT32_C(560513589))) + (INT64_C(1) << 31), 32)
+        + dcm_from_euler_angles_w32_mul(cos_pitch_quarters, (-INT32_C(1686629713))) * 2, 0);
         /* Q0.31, -0.786 .. 0.786, error 2.4e-10 */
     const int32_t cos_pitch_turns = dcm_from_euler_angles_w32_fit((int64_t)cos_pitch_quarters
         + 2, 2); /* Q31.0, 0 .. 1, exact */
@@ -190,42 +205,42 @@ int dcm_from_euler_angles_w32(const int32_t angles[3], int32_t attitude[9])
     const int32_t cos_pitch_square = dcm_from_euler_angles_w32_fit(
         dcm_from_euler_angles_w32_sqr(cos_pitch_rest) + (INT32_C(1) << 30), 31);
         /* Q0.31, -9.32e-10 .. 0.617, error 6e-10 */
-    const int32_t cos_pitch_series = dcm_from_euler_angles_w32_fit(
-        dcm_from_euler_angles_w32_shr(-dcm_from_euler_angles_w32_mul(cos_pitch_square,
-        INT32_C(56412333) /* 1/39916800 in Q51 */), 1)
-        + INT64_C(6662950945848033280) /* 1/362880 in Q60 */ + (INT64_C(1) << 31), 32);
+    const int32_t cos_pitch_series = dcm_from_euler_angles_w32_near(
+        dcm_from_euler_angles_w32_shr(dcm_from_euler_angles_w32_mul(cos_pitch_square,
+        (-INT32_C(56412333)) /* -1/39916800 in Q51 */), 1)
+        + INT64_C(6662950945848033280) /* 1/362880 in Q60 */);
         /* 2.74e-06 .. 2.76e-06, error 9.1e-16 */
-    const int32_t cos_pitch_series_2 = dcm_from_euler_angles_w32_fit(
+    const int32_t cos_pitch_series_2 = dcm_from_euler_angles_w32_near(
         dcm_from_euler_angles_w32_shr(dcm_from_euler_angles_w32_mul(cos_pitch_square,
-        cos_pitch_series), 5) - INT64_C(7495819814078808064) /* 1/5040 in Q60 */
-        + (INT64_C(1) << 31), 32); /* Q-12.43, -0.000199 .. -0.000196, error 6e-14 */
-    const int32_t cos_pitch_series_3 = dcm_from_euler_angles_w32_fit(
+        cos_pitch_series), 5) - INT64_C(7495819814078808064) /* 1/5040 in Q60 */);
+        /* Q-12.43, -0.000199 .. -0.000196, error 6e-14 */
+    const int32_t cos_pitch_series_3 = dcm_from_euler_angles_w32_near(
         dcm_from_euler_angles_w32_shr(dcm_from_euler_angles_w32_mul(cos_pitch_square,
-        cos_pitch_series_2), 5) + INT64_C(4919131752989213696) /* 1/120 in Q60 */
-        + (INT64_C(1) << 31), 32); /* 0.00821 .. 0.00834, error 3.8e-12 */
-    const int32_t cos_pitch_series_4 = dcm_from_euler_angles_w32_fit(
+        cos_pitch_series_2), 5) + INT64_C(4919131752989213696) /* 1/120 in Q60 */);
+        /* 0.00821 .. 0.00834, error 3.8e-12 */
+    const int32_t cos_pitch_series_4 = dcm_from_euler_angles_w32_near(
         dcm_from_euler_angles_w32_shr(dcm_from_euler_angles_w32_mul(cos_pitch_square,
-        cos_pitch_series_3), 3) - INT64_C(6148914691236517216) /* 1/6 in Q60 */
-        + (INT64_C(1) << 31), 32); /* Q-2.33, -0.167 .. -0.161, error 6.6e-11 */
+        cos_pitch_series_3), 3) - INT64_C(6148914691236517216) /* 1/6 in Q60 */);
+        /* Q-2.33, -0.167 .. -0.161, error 6.6e-11 */
     const int32_t cos_pitch_bend = dcm_from_euler_angles_w32_fit(dcm_from_euler_angles_w32_mul(
         cos_pitch_square, cos_pitch_series_4) + (INT32_C(1) << 29), 30);
         /* Q-3.34, -0.103 .. 1.75e-10, error 1.7e-10 */
     const int64_t cos_pitch_sine = (int64_t)cos_pitch_rest * (INT64_C(1) << 32)
         + dcm_from_euler_angles_w32_shr(dcm_from_euler_angles_w32_mul(cos_pitch_rest,
         cos_pitch_bend), 2); /* Q0.63, -0.786 .. 0.786, error 4e-10 */
-    const int32_t cos_pitch_series_5 = dcm_from_euler_angles_w32_fit(
-        dcm_from_euler_angles_w32_shr(-dcm_from_euler_angles_w32_mul(cos_pitch_square,
-        INT32_C(620535663) /* 1/3628800 in Q51 */), 4)
-        + INT64_C(7495819814078775296) /* 1/40320 in Q60 */ + (INT64_C(1) << 31), 32);
+    const int32_t cos_pitch_series_5 = dcm_from_euler_angles_w32_near(
+        dcm_from_euler_angles_w32_shr(dcm_from_euler_angles_w32_mul(cos_pitch_square,
+        (-INT32_C(620535663)) /* -1/3628800 in Q51 */), 4)
+        + INT64_C(7495819814078775296) /* 1/40320 in Q60 */);
         /* 2.46e-05 .. 2.49e-05, error 7.3e-15 */
-    const int32_t cos_pitch_series_6 = dcm_from_euler_angles_w32_fit(
+    const int32_t cos_pitch_series_6 = dcm_from_euler_angles_w32_near(
         dcm_from_euler_angles_w32_shr(dcm_from_euler_angles_w32_mul(cos_pitch_square,
-        cos_pitch_series_5), 5) - INT64_C(6558842337318952960) /* 1/720 in Q60 */
-        + (INT64_C(1) << 31), 32); /* Q-9.40, -0.00139 .. -0.00137, error 4.8e-13 */
-    const int32_t cos_pitch_series_7 = dcm_from_euler_angles_w32_fit(
+        cos_pitch_series_5), 5) - INT64_C(6558842337318952960) /* 1/720 in Q60 */);
+        /* Q-9.40, -0.00139 .. -0.00137, error 4.8e-13 */
+    const int32_t cos_pitch_series_7 = dcm_from_euler_angles_w32_near(
         dcm_from_euler_angles_w32_shr(dcm_from_euler_angles_w32_mul(cos_pitch_square,
-        cos_pitch_series_6), 4) + INT64_C(6148914691236517248) /* 1/24 in Q60 */
-        + (INT64_C(1) << 31), 32); /* 0.0408 .. 0.0417, error 1.6e-11 */
+        cos_pitch_series_6), 4) + INT64_C(6148914691236517248) /* 1/24 in Q60 */);
+        /* 0.0408 .. 0.0417, error 1.6e-11 */
     const int32_t cos_pitch_bend_2 = dcm_from_euler_angles_w32_fit(
         dcm_from_euler_angles_w32_mul(cos_pitch_square, cos_pitch_series_7)
         + (INT32_C(1) << 29), 30); /* Q-5.36, -4.37e-11 .. 0.0258, error 4.2e-11 */
@@ -245,8 +260,8 @@ int dcm_from_euler_angles_w32(const int32_t angles[3], int32_t attitude[9])
     } else {
         cos_pitch_quarter = cos_pitch_opposite_2;
     }
-    const int32_t cos_pitch = dcm_from_euler_angles_w32_fit(cos_pitch_quarter
-        + (INT64_C(1) << 31), 32); /* Q1.30, -1.01 .. 1.01, error 9.3e-10 */
+    const int32_t cos_pitch = dcm_from_euler_angles_w32_near(cos_pitch_quarter);
+        /* Q1.30, -1.01 .. 1.01, error 9.3e-10 */
     int64_t sin_pitch_quarter; /* Q1.62, -1.01 .. 1.01, error 4.6e-10 */
     if (cos_pitch_quarter_turns >= 1) {
         sin_pitch_quarter = cos_pitch_cosine;
@@ -257,15 +272,15 @@ int dcm_from_euler_angles_w32(const int32_t angles[3], int32_t attitude[9])
     } else {
         sin_pitch_quarter = dcm_from_euler_angles_w32_shr(cos_pitch_opposite, 1);
     }
-    const int32_t sin_pitch = dcm_from_euler_angles_w32_fit(sin_pitch_quarter
-        + (INT64_C(1) << 31), 32); /* Q1.30, -1.01 .. 1.01, error 9.3e-10 */
+    const int32_t sin_pitch = dcm_from_euler_angles_w32_near(sin_pitch_quarter);
+        /* Q1.30, -1.01 .. 1.01, error 9.3e-10 */
     const int32_t cos_roll_quarters = dcm_from_euler_angles_w32_fit(
         dcm_from_euler_angles_w32_mul(roll, INT32_C(1367130551)) + (INT64_C(1) << 59), 60);
         /* Q31.0, -2 .. 2, exact */
     const int32_t cos_roll_rest = dcm_from_euler_angles_w32_fit((int64_t)roll * 4
-        + dcm_from_euler_angles_w32_shr(-dcm_from_euler_angles_w32_mul(cos_roll_quarters,
-        INT32_C(560513589)) + (INT64_C(1) << 31), 32)
-        - dcm_from_euler_angles_w32_mul(cos_roll_quarters, INT32_C(1686629713)) * 2, 0);
+        + dcm_from_euler_angles_w32_shr(dcm_from_euler_angles_w32_mul(cos_roll_quarters,
+        (-INT32_C(560513589))) + (INT64_C(1) << 31), 32)
+        + dcm_from_euler_angles_w32_mul(cos_roll_quarters, (-INT32_C(1686629713))) * 2, 0);
         /* Q0.31, -0.786 .. 0.786, error 2.4e-10 */
     const int32_t cos_roll_turns = dcm_from_euler_angles_w32_fit((int64_t)cos_roll_quarters
         + 2, 2); /* Q31.0, 0 .. 1, exact */
@@ -273,42 +288,42 @@ int dcm_from_euler_angles_w32(const int32_t angles[3], int32_t attitude[9])
         - (int64_t)cos_roll_turns * 4; /* Q63.0, -2 .. 1, exact */
     const int32_t cos_roll_square = dcm_from_euler_angles_w32_fit(dcm_from_euler_angles_w32_sqr(
         cos_roll_rest) + (INT32_C(1) << 30), 31); /* Q0.31, -9.32e-10 .. 0.617, error 6e-10 */
-    const int32_t cos_roll_series = dcm_from_euler_angles_w32_fit(dcm_from_euler_angles_w32_shr(
-        -dcm_from_euler_angles_w32_mul(cos_roll_square,
-        INT32_C(56412333) /* 1/39916800 in Q51 */), 1)
-        + INT64_C(6662950945848033280) /* 1/362880 in Q60 */ + (INT64_C(1) << 31), 32);
+    const int32_t cos_roll_series = dcm_from_euler_angles_w32_near(
+        dcm_from_euler_angles_w32_shr(dcm_from_euler_angles_w32_mul(cos_roll_square,
+        (-INT32_C(56412333)) /* -1/39916800 in Q51 */), 1)
+        + INT64_C(6662950945848033280) /* 1/362880 in Q60 */);
         /* 2.74e-06 .. 2.76e-06, error 9.1e-16 */
-    const int32_t cos_roll_series_2 = dcm_from_euler_angles_w32_fit(
+    const int32_t cos_roll_series_2 = dcm_from_euler_angles_w32_near(
         dcm_from_euler_angles_w32_shr(dcm_from_euler_angles_w32_mul(cos_roll_square,
-        cos_roll_series), 5) - INT64_C(7495819814078808064) /* 1/5040 in Q60 */
-        + (INT64_C(1) << 31), 32); /* Q-12.43, -0.000199 .. -0.000196, error 6e-14 */
-    const int32_t cos_roll_series_3 = dcm_from_euler_angles_w32_fit(
+        cos_roll_series), 5) - INT64_C(7495819814078808064) /* 1/5040 in Q60 */);
+        /* Q-12.43, -0.000199 .. -0.000196, error 6e-14 */
+    const int32_t cos_roll_series_3 = dcm_from_euler_angles_w32_near(
         dcm_from_euler_angles_w32_shr(dcm_from_euler_angles_w32_mul(cos_roll_square,
-        cos_roll_series_2), 5) + INT64_C(4919131752989213696) /* 1/120 in Q60 */
-        + (INT64_C(1) << 31), 32); /* 0.00821 .. 0.00834, error 3.8e-12 */
-    const int32_t cos_roll_series_4 = dcm_from_euler_angles_w32_fit(
+        cos_roll_series_2), 5) + INT64_C(4919131752989213696) /* 1/120 in Q60 */);
+        /* 0.00821 .. 0.00834, error 3.8e-12 */
+    const int32_t cos_roll_series_4 = dcm_from_euler_angles_w32_near(
         dcm_from_euler_angles_w32_shr(dcm_from_euler_angles_w32_mul(cos_roll_square,
-        cos_roll_series_3), 3) - INT64_C(6148914691236517216) /* 1/6 in Q60 */
-        + (INT64_C(1) << 31), 32); /* Q-2.33, -0.167 .. -0.161, error 6.6e-11 */
+        cos_roll_series_3), 3) - INT64_C(6148914691236517216) /* 1/6 in Q60 */);
+        /* Q-2.33, -0.167 .. -0.161, error 6.6e-11 */
     const int32_t cos_roll_bend = dcm_from_euler_angles_w32_fit(dcm_from_euler_angles_w32_mul(
         cos_roll_square, cos_roll_series_4) + (INT32_C(1) << 29), 30);
         /* Q-3.34, -0.103 .. 1.75e-10, error 1.7e-10 */
     const int64_t cos_roll_sine = (int64_t)cos_roll_rest * (INT64_C(1) << 32)
         + dcm_from_euler_angles_w32_shr(dcm_from_euler_angles_w32_mul(cos_roll_rest,
         cos_roll_bend), 2); /* Q0.63, -0.786 .. 0.786, error 4e-10 */
-    const int32_t cos_roll_series_5 = dcm_from_euler_angles_w32_fit(
-        dcm_from_euler_angles_w32_shr(-dcm_from_euler_angles_w32_mul(cos_roll_square,
-        INT32_C(620535663) /* 1/3628800 in Q51 */), 4)
-        + INT64_C(7495819814078775296) /* 1/40320 in Q60 */ + (INT64_C(1) << 31), 32);
+    const int32_t cos_roll_series_5 = dcm_from_euler_angles_w32_near(
+        dcm_from_euler_angles_w32_shr(dcm_from_euler_angles_w32_mul(cos_roll_square,
+        (-INT32_C(620535663)) /* -1/3628800 in Q51 */), 4)
+        + INT64_C(7495819814078775296) /* 1/40320 in Q60 */);
         /* 2.46e-05 .. 2.49e-05, error 7.3e-15 */
-    const int32_t cos_roll_series_6 = dcm_from_euler_angles_w32_fit(
+    const int32_t cos_roll_series_6 = dcm_from_euler_angles_w32_near(
         dcm_from_euler_angles_w32_shr(dcm_from_euler_angles_w32_mul(cos_roll_square,
-        cos_roll_series_5), 5) - INT64_C(6558842337318952960) /* 1/720 in Q60 */
-        + (INT64_C(1) << 31), 32); /* Q-9.40, -0.00139 .. -0.00137, error 4.8e-13 */
-    const int32_t cos_roll_series_7 = dcm_from_euler_angles_w32_fit(
+        cos_roll_series_5), 5) - INT64_C(6558842337318952960) /* 1/720 in Q60 */);
+        /* Q-9.40, -0.00139 .. -0.00137, error 4.8e-13 */
+    const int32_t cos_roll_series_7 = dcm_from_euler_angles_w32_near(
         dcm_from_euler_angles_w32_shr(dcm_from_euler_angles_w32_mul(cos_roll_square,
-        cos_roll_series_6), 4) + INT64_C(6148914691236517248) /* 1/24 in Q60 */
-        + (INT64_C(1) << 31), 32); /* 0.0408 .. 0.0417, error 1.6e-11 */
+        cos_roll_series_6), 4) + INT64_C(6148914691236517248) /* 1/24 in Q60 */);
+        /* 0.0408 .. 0.0417, error 1.6e-11 */
     const int32_t cos_roll_bend_2 = dcm_from_euler_angles_w32_fit(dcm_from_euler_angles_w32_mul(
         cos_roll_square, cos_roll_series_7) + (INT32_C(1) << 29), 30);
         /* Q-5.36, -4.37e-11 .. 0.0258, error 4.2e-11 */
@@ -328,8 +343,8 @@ int dcm_from_euler_angles_w32(const int32_t angles[3], int32_t attitude[9])
     } else {
         cos_roll_quarter = cos_roll_opposite_2;
     }
-    const int32_t cos_roll = dcm_from_euler_angles_w32_fit(cos_roll_quarter
-        + (INT64_C(1) << 31), 32); /* Q1.30, -1.01 .. 1.01, error 9.3e-10 */
+    const int32_t cos_roll = dcm_from_euler_angles_w32_near(cos_roll_quarter);
+        /* Q1.30, -1.01 .. 1.01, error 9.3e-10 */
     int64_t sin_roll_quarter; /* Q1.62, -1.01 .. 1.01, error 4.6e-10 */
     if (cos_roll_quarter_turns >= 1) {
         sin_roll_quarter = cos_roll_cosine;
@@ -340,8 +355,8 @@ int dcm_from_euler_angles_w32(const int32_t angles[3], int32_t attitude[9])
     } else {
         sin_roll_quarter = dcm_from_euler_angles_w32_shr(cos_roll_opposite, 1);
     }
-    const int32_t sin_roll = dcm_from_euler_angles_w32_fit(sin_roll_quarter
-        + (INT64_C(1) << 31), 32); /* Q1.30, -1.01 .. 1.01, error 9.3e-10 */
+    const int32_t sin_roll = dcm_from_euler_angles_w32_near(sin_roll_quarter);
+        /* Q1.30, -1.01 .. 1.01, error 9.3e-10 */
     /* direction cosine matrix, body to reference */
     const int32_t C_11 = dcm_from_euler_angles_w32_fit(dcm_from_euler_angles_w32_mul(
         cos_heading, cos_pitch) + (INT32_C(1) << 29), 30);

@@ -13,7 +13,7 @@
 /* Nonzero if the magnitude of x exceeds the limit. */
 static inline int dcm_orth_optimal_w32_out(int32_t x, int32_t limit)
 {
-#if defined(__GNUC__) && (defined(__ARM_ARCH_6M__) || defined(__ARM_ARCH_8M_BASE__))
+#if defined(__GNUC__) && defined(__arm__)
     return ((uint32_t)x + (uint32_t)limit) > (2u * (uint32_t)limit); /* fewer instructions there */
 #else
     return (x < -limit) || (x > limit);
@@ -46,6 +46,18 @@ static inline int64_t dcm_orth_optimal_w32_mul(int32_t a, int32_t b)
 }
 #endif
 
+/* The exact product of two words, times -1. An instruction that accumulates a product takes it
+ * with a negated factor.
+ */
+static inline int64_t dcm_orth_optimal_w32_nml(int32_t a, int32_t b)
+{
+#if defined(__ARM_ARCH_ISA_THUMB) && (__ARM_ARCH_ISA_THUMB > 1)
+    return dcm_orth_optimal_w32_mul(a, -b);
+#else
+    return -dcm_orth_optimal_w32_mul(a, b);
+#endif
+}
+
 /* The exact square of a word. */
 static inline int64_t dcm_orth_optimal_w32_sqr(int32_t a)
 {
@@ -73,6 +85,27 @@ static inline int32_t dcm_orth_optimal_w32_fit(int64_t x, int n)
                                                  : (-1 - (int32_t)(UINT32_MAX - bits));
     return (high < 0) ? ~(~high >> beyond) : (high >> beyond);
 #endif
+}
+
+/* x / 2^32, to the nearest, where the proof of the ranges shows that it fits into a word: the high
+ * word of x, and one more if the first bit of the low one is set.
+ */
+static inline int32_t dcm_orth_optimal_w32_near(int64_t x)
+{
+#ifdef __FRAMAC__
+    const int64_t moved = x + INT64_C(2147483648);
+    return (int32_t)((moved < 0) ? ~(~moved >> 32) : (moved >> 32));
+#else
+    const uint32_t carry = (uint32_t)x >> 31;
+    const uint32_t bits = (uint32_t)((uint64_t)x >> 32) + carry;
+    return (bits <= (UINT32_MAX >> 1)) ? (int32_t)bits : (-1 - (int32_t)(UINT32_MAX - bits));
+#endif
+}
+
+/* x / 2^n of a word, rounded down. */
+static inline int32_t dcm_orth_optimal_w32_asr(int32_t x, int n)
+{
+    return (x >= 0) ? (x >> n) : ~(~x >> n);
 }
 
 /* x / 2^n, rounded down, as a wide number. */
@@ -180,7 +213,7 @@ int dcm_orth_optimal_w32(const int32_t computed[9], int32_t orthonormalized[9])
     const int32_t spread_product_5 = dcm_orth_optimal_w32_fit(dcm_orth_optimal_w32_sqr(gram_13)
         + (INT32_C(1) << 30), 31); /* Q4.27, -1.5e-08 .. 11.5, error 1.1e-08 */
     /* mean square spread of the eigenvalues, halved */
-    const int32_t spread = dcm_orth_optimal_w32_fit(dcm_orth_optimal_w32_mul(shared_2,
+    const int32_t spread = dcm_orth_optimal_w32_near(dcm_orth_optimal_w32_mul(shared_2,
         INT32_C(1431655765) /* 1/3 in Q32 */)
         + dcm_orth_optimal_w32_shr(dcm_orth_optimal_w32_mul(spread_product,
         INT32_C(1431655765) /* 1/6 in Q33 */), 2)
@@ -189,28 +222,30 @@ int dcm_orth_optimal_w32(const int32_t computed[9], int32_t orthonormalized[9])
         + dcm_orth_optimal_w32_shr(dcm_orth_optimal_w32_mul(spread_product_3,
         INT32_C(1431655765) /* 1/6 in Q33 */), 2)
         + dcm_orth_optimal_w32_mul(spread_product_4, INT32_C(1431655765) /* 1/3 in Q32 */)
-        + dcm_orth_optimal_w32_mul(spread_product_5, INT32_C(1431655765) /* 1/3 in Q32 */)
-        + (INT64_C(1) << 31), 32); /* Q4.27, -2.99e-08 .. 14.1, error 2.7e-08 */
-    const int32_t half_determinant_factor = dcm_orth_optimal_w32_fit(dcm_orth_optimal_w32_mul(
-        deviator_22, deviator_33) - (int64_t)shared_2 * (INT64_C(1) << 31)
-        + (INT64_C(1) << 31), 32); /* Q5.26, -16.6 .. 5.1, error 3.4e-08 */
-    const int32_t half_determinant_factor_2 = dcm_orth_optimal_w32_fit(dcm_orth_optimal_w32_mul(
-        gram_13, gram_23) - dcm_orth_optimal_w32_mul(deviator_33, gram_12)
-        + (INT64_C(1) << 31), 32); /* Q5.26, -19.2 .. 19.2, error 2.8e-08 */
-    const int32_t half_determinant_factor_3 = dcm_orth_optimal_w32_fit(dcm_orth_optimal_w32_mul(
-        gram_12, gram_23) - dcm_orth_optimal_w32_mul(deviator_22, gram_13)
-        + (INT64_C(1) << 31), 32); /* Q5.26, -19.2 .. 19.2, error 2.8e-08 */
-    const int32_t half_determinant = dcm_orth_optimal_w32_fit(dcm_orth_optimal_w32_mul(
+        + dcm_orth_optimal_w32_mul(spread_product_5, INT32_C(1431655765) /* 1/3 in Q32 */));
+        /* Q4.27, -2.99e-08 .. 14.1, error 2.7e-08 */
+    const int32_t half_determinant_factor = dcm_orth_optimal_w32_near(dcm_orth_optimal_w32_mul(
+        deviator_22, deviator_33) - (int64_t)shared_2 * (INT64_C(1) << 31));
+        /* Q5.26, -16.6 .. 5.1, error 3.4e-08 */
+    const int32_t half_determinant_factor_2 = dcm_orth_optimal_w32_near(
+        dcm_orth_optimal_w32_mul(gram_13, gram_23)
+        + dcm_orth_optimal_w32_nml(gram_12, deviator_33));
+        /* Q5.26, -19.2 .. 19.2, error 2.8e-08 */
+    const int32_t half_determinant_factor_3 = dcm_orth_optimal_w32_near(
+        dcm_orth_optimal_w32_mul(gram_12, gram_23)
+        + dcm_orth_optimal_w32_nml(gram_13, deviator_22));
+        /* Q5.26, -19.2 .. 19.2, error 2.8e-08 */
+    const int32_t half_determinant = dcm_orth_optimal_w32_near(dcm_orth_optimal_w32_mul(
         deviator_11, half_determinant_factor)
         + dcm_orth_optimal_w32_mul(gram_12, half_determinant_factor_2)
-        + dcm_orth_optimal_w32_mul(gram_13, half_determinant_factor_3)
-        + (INT64_C(1) << 31), 32); /* Q7.24, -83.5 .. 83.5, error 2.2e-07 */
+        + dcm_orth_optimal_w32_mul(gram_13, half_determinant_factor_3));
+        /* Q7.24, -83.5 .. 83.5, error 2.2e-07 */
     const int32_t angle_angle_arg_rad_max_arg_fac = dcm_orth_optimal_w32_fit(
         dcm_orth_optimal_w32_sqr(spread) + (INT32_C(1) << 30), 31);
         /* Q8.23, -8.35e-07 .. 197, error 7.9e-07 */
     const int64_t angle_angle_arg_rad_max_arg = dcm_orth_optimal_w32_shr(
         dcm_orth_optimal_w32_mul(angle_angle_arg_rad_max_arg_fac, spread), 1)
-        - dcm_orth_optimal_w32_sqr(half_determinant) * 2;
+        + dcm_orth_optimal_w32_nml(half_determinant, half_determinant) * 2;
         /* Q14.49, -6.97e+03 .. 2.76e+03, error 5.2e-05 */
     int64_t angle_angle_arg_rad_largest = 0; /* Q14.49, -5.13e-05 .. 2.76e+03, error 5.2e-05 */
     if (angle_angle_arg_rad_max_arg > angle_angle_arg_rad_largest) {
@@ -276,27 +311,27 @@ int dcm_orth_optimal_w32(const int32_t computed[9], int32_t orthonormalized[9])
     const int32_t angle_angle_square = dcm_orth_optimal_w32_fit(dcm_orth_optimal_w32_sqr(
         angle_angle_tangent) + (INT32_C(1) << 30), 31);
         /* Q-2.33, -2.33e-10 .. 0.192, error 1.7e-10 */
-    const int32_t angle_angle_series = dcm_orth_optimal_w32_fit(dcm_orth_optimal_w32_shr(
+    const int32_t angle_angle_series = dcm_orth_optimal_w32_near(dcm_orth_optimal_w32_shr(
         dcm_orth_optimal_w32_mul(angle_angle_square,
         INT32_C(735255871) /* 0.042797524437051732 in Q34 */), 1)
-        - INT64_C(6065684321545150080) /* 0.08220535148788144 in Q60 */
-        + (INT64_C(1) << 31), 32); /* Q-3.34, -0.0823 .. -0.074, error 3.9e-11 */
+        - INT64_C(6065684321545150080) /* 0.08220535148788144 in Q60 */);
+        /* Q-3.34, -0.0823 .. -0.074, error 3.9e-11 */
     const int32_t angle_angle_series_2 = dcm_orth_optimal_w32_fit(dcm_orth_optimal_w32_shr(
         dcm_orth_optimal_w32_mul(angle_angle_square, angle_angle_series), 2)
         + INT64_C(4054853067505913472) /* 0.10990701262248558 in Q60 */
         + (INT32_C(1) << 30), 31); /* 0.0941 .. 0.11, error 5e-11 */
-    const int32_t angle_angle_series_3 = dcm_orth_optimal_w32_fit(dcm_orth_optimal_w32_shr(
+    const int32_t angle_angle_series_3 = dcm_orth_optimal_w32_near(dcm_orth_optimal_w32_shr(
         dcm_orth_optimal_w32_mul(angle_angle_square, angle_angle_series_2), 2)
-        - INT64_C(5267120772635892064) /* 0.14276559461088406 in Q60 */
-        + (INT64_C(1) << 31), 32); /* Q-2.33, -0.143 .. -0.121, error 8.6e-11 */
-    const int32_t angle_angle_series_4 = dcm_orth_optimal_w32_fit(dcm_orth_optimal_w32_shr(
+        - INT64_C(5267120772635892064) /* 0.14276559461088406 in Q60 */);
+        /* Q-2.33, -0.143 .. -0.121, error 8.6e-11 */
+    const int32_t angle_angle_series_4 = dcm_orth_optimal_w32_near(dcm_orth_optimal_w32_shr(
         dcm_orth_optimal_w32_mul(angle_angle_square, angle_angle_series_3), 1)
-        + INT64_C(7378564090463267680) /* 0.19999638041759513 in Q60 */
-        + (INT64_C(1) << 31), 32); /* 0.172 .. 0.2, error 9.8e-11 */
-    const int32_t angle_angle_series_5 = dcm_orth_optimal_w32_fit(dcm_orth_optimal_w32_shr(
+        + INT64_C(7378564090463267680) /* 0.19999638041759513 in Q60 */);
+        /* 0.172 .. 0.2, error 9.8e-11 */
+    const int32_t angle_angle_series_5 = dcm_orth_optimal_w32_near(dcm_orth_optimal_w32_shr(
         dcm_orth_optimal_w32_mul(angle_angle_square, angle_angle_series_4), 2)
-        - INT64_C(6148913518682917232) /* 0.33333326976907529 in Q60 */
-        + (INT64_C(1) << 31), 32); /* Q-1.32, -0.334 .. -0.295, error 1.7e-10 */
+        - INT64_C(6148913518682917232) /* 0.33333326976907529 in Q60 */);
+        /* Q-1.32, -0.334 .. -0.295, error 1.7e-10 */
     const int32_t angle_angle_bend = dcm_orth_optimal_w32_fit(dcm_orth_optimal_w32_mul(
         angle_angle_square, angle_angle_series_5)
         - INT64_C(11967952160) /* 3.2439199325215087e-10 in Q60 */
@@ -328,12 +363,11 @@ int dcm_orth_optimal_w32(const int32_t computed[9], int32_t orthonormalized[9])
     } else {
         angle_angle_half = angle_angle_angle_3 * 2;
     }
-    const int32_t angle_angle = dcm_orth_optimal_w32_fit(angle_angle_half
-        + (INT64_C(1) << 31), 32); /* Q2.29, -1.87e-09 .. 3.15, error 3.2 */
+    const int32_t angle_angle = dcm_orth_optimal_w32_near(angle_angle_half);
+        /* Q2.29, -1.87e-09 .. 3.15, error 3.2 */
     /* angle of the cubic */
-    const int32_t angle = dcm_orth_optimal_w32_fit(dcm_orth_optimal_w32_mul(angle_angle,
-        INT32_C(1431655765) /* 1/3 in Q32 */) + (INT64_C(1) << 31), 32);
-        /* Q2.29, -1.05 .. 2.1, error 1.1 */
+    const int32_t angle = dcm_orth_optimal_w32_near(dcm_orth_optimal_w32_mul(angle_angle,
+        INT32_C(1431655765) /* 1/3 in Q32 */)); /* Q2.29, -1.05 .. 2.1, error 1.1 */
     const int32_t radius = dcm_orth_optimal_w32_rt((int64_t)spread * (INT32_C(1) << 29));
         /* Q3.28, 0 .. 3.75, error 0.00017 */
     int32_t along_cosine_taken; /* Q2.29, 0 .. 1.05, exact */
@@ -351,55 +385,54 @@ int dcm_orth_optimal_w32(const int32_t computed[9], int32_t orthonormalized[9])
         along_cosine_square, INT32_C(18804111) /* 1/479001600 in Q53 */)
         - INT64_C(2665180378335019008) /* 1/3628800 in Q60 */ + (INT32_C(1) << 30), 31);
         /* Q-21.52, -2.76e-07 .. -2.73e-07, error 1.2e-16 */
-    const int32_t along_cosine_series_2 = dcm_orth_optimal_w32_fit(dcm_orth_optimal_w32_shr(
+    const int32_t along_cosine_series_2 = dcm_orth_optimal_w32_near(dcm_orth_optimal_w32_shr(
         dcm_orth_optimal_w32_mul(along_cosine_square, along_cosine_series), 4)
-        + INT64_C(7495819814078775296) /* 1/40320 in Q60 */ + (INT64_C(1) << 31), 32);
+        + INT64_C(7495819814078775296) /* 1/40320 in Q60 */);
         /* 2.44e-05 .. 2.49e-05, error 7.4e-15 */
-    const int32_t along_cosine_series_3 = dcm_orth_optimal_w32_fit(dcm_orth_optimal_w32_shr(
+    const int32_t along_cosine_series_3 = dcm_orth_optimal_w32_near(dcm_orth_optimal_w32_shr(
         dcm_orth_optimal_w32_mul(along_cosine_square, along_cosine_series_2), 4)
-        - INT64_C(6558842337318952960) /* 1/720 in Q60 */ + (INT64_C(1) << 31), 32);
+        - INT64_C(6558842337318952960) /* 1/720 in Q60 */);
         /* Q-9.40, -0.00139 .. -0.00136, error 4.8e-13 */
-    const int32_t along_cosine_series_4 = dcm_orth_optimal_w32_fit(dcm_orth_optimal_w32_shr(
+    const int32_t along_cosine_series_4 = dcm_orth_optimal_w32_near(dcm_orth_optimal_w32_shr(
         dcm_orth_optimal_w32_mul(along_cosine_square, along_cosine_series_3), 3)
-        + INT64_C(6148914691236517248) /* 1/24 in Q60 */ + (INT64_C(1) << 31), 32);
+        + INT64_C(6148914691236517248) /* 1/24 in Q60 */);
         /* 0.0401 .. 0.0417, error 1.6e-11 */
     const int32_t along_cosine_bend = dcm_orth_optimal_w32_fit(dcm_orth_optimal_w32_mul(
         along_cosine_square, along_cosine_series_4) + (INT32_C(1) << 29), 30);
         /* Q-4.35, -5.83e-11 .. 0.0457, error 5.2e-11 */
-    const int32_t along_cosine = (INT32_C(1) << 30)
-        + dcm_orth_optimal_w32_fit(-(int64_t)along_cosine_square * (INT64_C(1) << 32)
-        + dcm_orth_optimal_w32_shr(dcm_orth_optimal_w32_mul(along_cosine_square,
-        along_cosine_bend), 2) + (INT64_C(1) << 32), 33);
+    const int32_t along_cosine = (INT32_C(1) << 30) + dcm_orth_optimal_w32_asr(
+        dcm_orth_optimal_w32_fit(dcm_orth_optimal_w32_shr(dcm_orth_optimal_w32_mul(
+        along_cosine_square, along_cosine_bend), 2), 32) - along_cosine_square + 1, 1);
         /* Q1.30, 0.451 .. 1.01, error 0.55 */
     const int64_t along = dcm_orth_optimal_w32_mul(along_cosine, radius);
         /* Q5.58, -2.06 .. 5.8, error 2.1 */
-    const int32_t across_sine_series = dcm_orth_optimal_w32_fit(dcm_orth_optimal_w32_shr(
+    const int32_t across_sine_series = dcm_orth_optimal_w32_near(dcm_orth_optimal_w32_shr(
         dcm_orth_optimal_w32_mul(along_cosine_square,
         INT32_C(1481185359) /* 1/6227020800 in Q63 */), 5)
-        - INT64_C(7753252009628663808) /* 1/39916800 in Q60 */ + (INT64_C(1) << 31), 32);
+        - INT64_C(7753252009628663808) /* 1/39916800 in Q60 */);
         /* Q-25.56, -2.51e-08 .. -2.48e-08, error 7.4e-18 */
-    const int32_t across_sine_series_2 = dcm_orth_optimal_w32_fit(dcm_orth_optimal_w32_shr(
+    const int32_t across_sine_series_2 = dcm_orth_optimal_w32_near(dcm_orth_optimal_w32_shr(
         dcm_orth_optimal_w32_mul(along_cosine_square, across_sine_series), 5)
-        + INT64_C(6662950945848033280) /* 1/362880 in Q60 */ + (INT64_C(1) << 31), 32);
+        + INT64_C(6662950945848033280) /* 1/362880 in Q60 */);
         /* 2.72e-06 .. 2.76e-06, error 9.1e-16 */
-    const int32_t across_sine_series_3 = dcm_orth_optimal_w32_fit(dcm_orth_optimal_w32_shr(
+    const int32_t across_sine_series_3 = dcm_orth_optimal_w32_near(dcm_orth_optimal_w32_shr(
         dcm_orth_optimal_w32_mul(along_cosine_square, across_sine_series_2), 4)
-        - INT64_C(7495819814078808064) /* 1/5040 in Q60 */ + (INT64_C(1) << 31), 32);
+        - INT64_C(7495819814078808064) /* 1/5040 in Q60 */);
         /* Q-12.43, -0.000199 .. -0.000195, error 6e-14 */
-    const int32_t across_sine_series_4 = dcm_orth_optimal_w32_fit(dcm_orth_optimal_w32_shr(
+    const int32_t across_sine_series_4 = dcm_orth_optimal_w32_near(dcm_orth_optimal_w32_shr(
         dcm_orth_optimal_w32_mul(along_cosine_square, across_sine_series_3), 4)
-        + INT64_C(4919131752989213696) /* 1/120 in Q60 */ + (INT64_C(1) << 31), 32);
+        + INT64_C(4919131752989213696) /* 1/120 in Q60 */);
         /* 0.00811 .. 0.00834, error 3.8e-12 */
-    const int32_t across_sine_series_5 = dcm_orth_optimal_w32_fit(dcm_orth_optimal_w32_shr(
+    const int32_t across_sine_series_5 = dcm_orth_optimal_w32_near(dcm_orth_optimal_w32_shr(
         dcm_orth_optimal_w32_mul(along_cosine_square, across_sine_series_4), 2)
-        - INT64_C(6148914691236517216) /* 1/6 in Q60 */ + (INT64_C(1) << 31), 32);
+        - INT64_C(6148914691236517216) /* 1/6 in Q60 */);
         /* Q-2.33, -0.167 .. -0.157, error 6.7e-11 */
     const int32_t across_sine_bend = dcm_orth_optimal_w32_fit(dcm_orth_optimal_w32_mul(
         along_cosine_square, across_sine_series_5) + (INT32_C(1) << 29), 30);
         /* Q-2.33, -0.183 .. 2.33e-10, error 2.1e-10 */
     const int32_t across_sine = along_cosine_taken * 2
-        + dcm_orth_optimal_w32_fit(dcm_orth_optimal_w32_mul(along_cosine_taken,
-        across_sine_bend) + (INT64_C(1) << 31), 32); /* Q1.30, -9.32e-10 .. 1.01, error 1.1 */
+        + dcm_orth_optimal_w32_near(dcm_orth_optimal_w32_mul(along_cosine_taken,
+        across_sine_bend)); /* Q1.30, -9.32e-10 .. 1.01, error 1.1 */
     const int32_t across_product = dcm_orth_optimal_w32_fit(dcm_orth_optimal_w32_mul(
         across_sine, radius) + (INT32_C(1) << 29), 30); /* Q3.28, -3.75 .. 7.49, error 3.8 */
     const int64_t across = dcm_orth_optimal_w32_mul(across_product, INT32_C(1859775393));
@@ -444,43 +477,46 @@ int dcm_orth_optimal_w32(const int32_t computed[9], int32_t orthonormalized[9])
     const int64_t invariant_3 = dcm_orth_optimal_w32_mul(shared_3, stretch_3);
         /* Q5.58, 0.353 .. 2.83, error 7e-09 */
     /* i1 C' C + i3 I */
-    const int32_t denominator_11 = dcm_orth_optimal_w32_fit(invariant_3
-        + dcm_orth_optimal_w32_mul(gram_11, invariant_1) * 2 + (INT64_C(1) << 31), 32);
+    const int32_t denominator_11 = dcm_orth_optimal_w32_near(invariant_3
+        + dcm_orth_optimal_w32_mul(gram_11, invariant_1) * 2);
         /* Q5.26, 0.353 .. 17.2, error 3.5e-08 */
     const int32_t denominator_12 = dcm_orth_optimal_w32_fit(dcm_orth_optimal_w32_mul(gram_12,
         invariant_1) + (INT32_C(1) << 29), 30); /* Q4.27, -14.4 .. 14.4, error 2.4e-08 */
     const int32_t denominator_13 = dcm_orth_optimal_w32_fit(dcm_orth_optimal_w32_mul(gram_13,
         invariant_1) + (INT32_C(1) << 29), 30); /* Q4.27, -14.4 .. 14.4, error 2.4e-08 */
-    const int32_t denominator_22 = dcm_orth_optimal_w32_fit(invariant_3
-        + dcm_orth_optimal_w32_mul(gram_22, invariant_1) * 2 + (INT64_C(1) << 31), 32);
+    const int32_t denominator_22 = dcm_orth_optimal_w32_near(invariant_3
+        + dcm_orth_optimal_w32_mul(gram_22, invariant_1) * 2);
         /* Q5.26, 0.353 .. 17.2, error 3.5e-08 */
     const int32_t denominator_23 = dcm_orth_optimal_w32_fit(dcm_orth_optimal_w32_mul(gram_23,
         invariant_1) + (INT32_C(1) << 29), 30); /* Q4.27, -14.4 .. 14.4, error 2.4e-08 */
-    const int32_t denominator_33 = dcm_orth_optimal_w32_fit(invariant_3
-        + dcm_orth_optimal_w32_mul(gram_33, invariant_1) * 2 + (INT64_C(1) << 31), 32);
+    const int32_t denominator_33 = dcm_orth_optimal_w32_near(invariant_3
+        + dcm_orth_optimal_w32_mul(gram_33, invariant_1) * 2);
         /* Q5.26, 0.353 .. 17.2, error 3.5e-08 */
     /* adjugate of the denominator */
-    const int32_t adjugate_11 = dcm_orth_optimal_w32_fit(dcm_orth_optimal_w32_mul(
-        denominator_22, denominator_33) * 4 - dcm_orth_optimal_w32_sqr(denominator_23)
-        + (INT64_C(1) << 31), 32); /* Q9.22, -207 .. 296, error 2e-06 */
-    const int32_t adjugate_12 = dcm_orth_optimal_w32_fit(dcm_orth_optimal_w32_mul(
+    const int32_t adjugate_11 = dcm_orth_optimal_w32_near(dcm_orth_optimal_w32_mul(
+        denominator_22, denominator_33) * 4
+        + dcm_orth_optimal_w32_nml(denominator_23, denominator_23));
+        /* Q9.22, -207 .. 296, error 2e-06 */
+    const int32_t adjugate_12 = dcm_orth_optimal_w32_near(dcm_orth_optimal_w32_mul(
         denominator_13, denominator_23)
-        - dcm_orth_optimal_w32_mul(denominator_12, denominator_33) * 2
-        + (INT64_C(1) << 31), 32); /* Q9.22, -454 .. 454, error 1.7e-06 */
-    const int32_t adjugate_13 = dcm_orth_optimal_w32_fit(dcm_orth_optimal_w32_mul(
+        + dcm_orth_optimal_w32_nml(denominator_33, denominator_12) * 2);
+        /* Q9.22, -454 .. 454, error 1.7e-06 */
+    const int32_t adjugate_13 = dcm_orth_optimal_w32_near(dcm_orth_optimal_w32_mul(
         denominator_12, denominator_23)
-        - dcm_orth_optimal_w32_mul(denominator_13, denominator_22) * 2
-        + (INT64_C(1) << 31), 32); /* Q9.22, -454 .. 454, error 1.7e-06 */
-    const int32_t adjugate_22 = dcm_orth_optimal_w32_fit(dcm_orth_optimal_w32_mul(
-        denominator_11, denominator_33) * 4 - dcm_orth_optimal_w32_sqr(denominator_13)
-        + (INT64_C(1) << 31), 32); /* Q9.22, -207 .. 296, error 2e-06 */
-    const int32_t adjugate_23 = dcm_orth_optimal_w32_fit(dcm_orth_optimal_w32_mul(
+        + dcm_orth_optimal_w32_nml(denominator_22, denominator_13) * 2);
+        /* Q9.22, -454 .. 454, error 1.7e-06 */
+    const int32_t adjugate_22 = dcm_orth_optimal_w32_near(dcm_orth_optimal_w32_mul(
+        denominator_11, denominator_33) * 4
+        + dcm_orth_optimal_w32_nml(denominator_13, denominator_13));
+        /* Q9.22, -207 .. 296, error 2e-06 */
+    const int32_t adjugate_23 = dcm_orth_optimal_w32_near(dcm_orth_optimal_w32_mul(
         denominator_12, denominator_13)
-        - dcm_orth_optimal_w32_mul(denominator_11, denominator_23) * 2
-        + (INT64_C(1) << 31), 32); /* Q9.22, -454 .. 454, error 1.7e-06 */
-    const int32_t adjugate_33 = dcm_orth_optimal_w32_fit(dcm_orth_optimal_w32_mul(
-        denominator_11, denominator_22) * 4 - dcm_orth_optimal_w32_sqr(denominator_12)
-        + (INT64_C(1) << 31), 32); /* Q9.22, -207 .. 296, error 2e-06 */
+        + dcm_orth_optimal_w32_nml(denominator_11, denominator_23) * 2);
+        /* Q9.22, -454 .. 454, error 1.7e-06 */
+    const int32_t adjugate_33 = dcm_orth_optimal_w32_near(dcm_orth_optimal_w32_mul(
+        denominator_11, denominator_22) * 4
+        + dcm_orth_optimal_w32_nml(denominator_12, denominator_12));
+        /* Q9.22, -207 .. 296, error 2e-06 */
     const int64_t inverse_determinant_den_raw = dcm_orth_optimal_w32_shr(
         dcm_orth_optimal_w32_mul(adjugate_11, denominator_11)
         + dcm_orth_optimal_w32_shr(dcm_orth_optimal_w32_mul(adjugate_12, denominator_12), 1)
@@ -502,57 +538,57 @@ int dcm_orth_optimal_w32(const int32_t computed[9], int32_t orthonormalized[9])
     const int32_t shared_6 = dcm_orth_optimal_w32_fit((int64_t)gram_11 * (INT32_C(1) << 29)
         + invariant_2 + (INT32_C(1) << 30), 31); /* Q4.27, 1.49 .. 9.39, error 1.4e-08 */
     /* inverse root of C' C, times the determinant */
-    const int32_t root_11 = dcm_orth_optimal_w32_fit(dcm_orth_optimal_w32_shr(shared_4, 1)
+    const int32_t root_11 = dcm_orth_optimal_w32_near(dcm_orth_optimal_w32_shr(shared_4, 1)
         + dcm_orth_optimal_w32_shr(shared_5, 1)
-        + dcm_orth_optimal_w32_mul(adjugate_11, shared_6) * 2 + (INT64_C(1) << 31), 32);
+        + dcm_orth_optimal_w32_mul(adjugate_11, shared_6) * 2);
         /* Q13.18, -5.01e+03 .. 5.85e+03, error 3.7e-05 */
-    const int32_t root_12 = dcm_orth_optimal_w32_fit(dcm_orth_optimal_w32_mul(adjugate_12,
+    const int32_t root_12 = dcm_orth_optimal_w32_near(dcm_orth_optimal_w32_mul(adjugate_12,
         shared_6) * 2
         + dcm_orth_optimal_w32_shr(dcm_orth_optimal_w32_mul(adjugate_22, gram_12), 1)
-        + dcm_orth_optimal_w32_shr(dcm_orth_optimal_w32_mul(adjugate_23, gram_13), 1)
-        + (INT64_C(1) << 31), 32); /* Q13.18, -6.8e+03 .. 6.8e+03, error 3.7e-05 */
-    const int32_t root_13 = dcm_orth_optimal_w32_fit(dcm_orth_optimal_w32_mul(adjugate_13,
+        + dcm_orth_optimal_w32_shr(dcm_orth_optimal_w32_mul(adjugate_23, gram_13), 1));
+        /* Q13.18, -6.8e+03 .. 6.8e+03, error 3.7e-05 */
+    const int32_t root_13 = dcm_orth_optimal_w32_near(dcm_orth_optimal_w32_mul(adjugate_13,
         shared_6) * 2
         + dcm_orth_optimal_w32_shr(dcm_orth_optimal_w32_mul(adjugate_23, gram_12), 1)
-        + dcm_orth_optimal_w32_shr(dcm_orth_optimal_w32_mul(adjugate_33, gram_13), 1)
-        + (INT64_C(1) << 31), 32); /* Q13.18, -6.8e+03 .. 6.8e+03, error 3.7e-05 */
+        + dcm_orth_optimal_w32_shr(dcm_orth_optimal_w32_mul(adjugate_33, gram_13), 1));
+        /* Q13.18, -6.8e+03 .. 6.8e+03, error 3.7e-05 */
     const int32_t shared_7 = dcm_orth_optimal_w32_fit((int64_t)gram_22 * (INT32_C(1) << 29)
         + invariant_2 + (INT32_C(1) << 30), 31); /* Q4.27, 1.49 .. 9.39, error 1.4e-08 */
-    const int32_t root_21 = dcm_orth_optimal_w32_fit(dcm_orth_optimal_w32_shr(
+    const int32_t root_21 = dcm_orth_optimal_w32_near(dcm_orth_optimal_w32_shr(
         dcm_orth_optimal_w32_mul(adjugate_11, gram_12), 1)
         + dcm_orth_optimal_w32_mul(adjugate_12, shared_7) * 2
-        + dcm_orth_optimal_w32_shr(dcm_orth_optimal_w32_mul(adjugate_13, gram_23), 1)
-        + (INT64_C(1) << 31), 32); /* Q13.18, -6.8e+03 .. 6.8e+03, error 3.7e-05 */
+        + dcm_orth_optimal_w32_shr(dcm_orth_optimal_w32_mul(adjugate_13, gram_23), 1));
+        /* Q13.18, -6.8e+03 .. 6.8e+03, error 3.7e-05 */
     const int64_t shared_8 = dcm_orth_optimal_w32_mul(adjugate_23, gram_23);
         /* Q12.51, -1.54e+03 .. 1.54e+03, error 6.2e-06 */
-    const int32_t root_22 = dcm_orth_optimal_w32_fit(dcm_orth_optimal_w32_shr(shared_4, 1)
+    const int32_t root_22 = dcm_orth_optimal_w32_near(dcm_orth_optimal_w32_shr(shared_4, 1)
         + dcm_orth_optimal_w32_shr(shared_8, 1)
-        + dcm_orth_optimal_w32_mul(adjugate_22, shared_7) * 2 + (INT64_C(1) << 31), 32);
+        + dcm_orth_optimal_w32_mul(adjugate_22, shared_7) * 2);
         /* Q13.18, -5.01e+03 .. 5.85e+03, error 3.7e-05 */
-    const int32_t root_23 = dcm_orth_optimal_w32_fit(dcm_orth_optimal_w32_shr(
+    const int32_t root_23 = dcm_orth_optimal_w32_near(dcm_orth_optimal_w32_shr(
         dcm_orth_optimal_w32_mul(adjugate_13, gram_12), 1)
         + dcm_orth_optimal_w32_mul(adjugate_23, shared_7) * 2
-        + dcm_orth_optimal_w32_shr(dcm_orth_optimal_w32_mul(adjugate_33, gram_23), 1)
-        + (INT64_C(1) << 31), 32); /* Q13.18, -6.8e+03 .. 6.8e+03, error 3.7e-05 */
+        + dcm_orth_optimal_w32_shr(dcm_orth_optimal_w32_mul(adjugate_33, gram_23), 1));
+        /* Q13.18, -6.8e+03 .. 6.8e+03, error 3.7e-05 */
     const int32_t shared_9 = dcm_orth_optimal_w32_fit((int64_t)gram_33 * (INT32_C(1) << 29)
         + invariant_2 + (INT32_C(1) << 30), 31); /* Q4.27, 1.49 .. 9.39, error 1.4e-08 */
-    const int32_t root_31 = dcm_orth_optimal_w32_fit(dcm_orth_optimal_w32_shr(
+    const int32_t root_31 = dcm_orth_optimal_w32_near(dcm_orth_optimal_w32_shr(
         dcm_orth_optimal_w32_mul(adjugate_11, gram_13), 1)
         + dcm_orth_optimal_w32_shr(dcm_orth_optimal_w32_mul(adjugate_12, gram_23), 1)
-        + dcm_orth_optimal_w32_mul(adjugate_13, shared_9) * 2 + (INT64_C(1) << 31), 32);
+        + dcm_orth_optimal_w32_mul(adjugate_13, shared_9) * 2);
         /* Q13.18, -6.8e+03 .. 6.8e+03, error 3.7e-05 */
-    const int32_t root_32 = dcm_orth_optimal_w32_fit(dcm_orth_optimal_w32_shr(
+    const int32_t root_32 = dcm_orth_optimal_w32_near(dcm_orth_optimal_w32_shr(
         dcm_orth_optimal_w32_mul(adjugate_12, gram_13), 1)
         + dcm_orth_optimal_w32_shr(dcm_orth_optimal_w32_mul(adjugate_22, gram_23), 1)
-        + dcm_orth_optimal_w32_mul(adjugate_23, shared_9) * 2 + (INT64_C(1) << 31), 32);
+        + dcm_orth_optimal_w32_mul(adjugate_23, shared_9) * 2);
         /* Q13.18, -6.8e+03 .. 6.8e+03, error 3.7e-05 */
-    const int32_t root_33 = dcm_orth_optimal_w32_fit(dcm_orth_optimal_w32_shr(shared_5, 1)
+    const int32_t root_33 = dcm_orth_optimal_w32_near(dcm_orth_optimal_w32_shr(shared_5, 1)
         + dcm_orth_optimal_w32_shr(shared_8, 1)
-        + dcm_orth_optimal_w32_mul(adjugate_33, shared_9) * 2 + (INT64_C(1) << 31), 32);
+        + dcm_orth_optimal_w32_mul(adjugate_33, shared_9) * 2);
         /* Q13.18, -5.01e+03 .. 5.85e+03, error 3.7e-05 */
-    const int32_t next_11_factor = dcm_orth_optimal_w32_fit(dcm_orth_optimal_w32_mul(C_11,
+    const int32_t next_11_factor = dcm_orth_optimal_w32_near(dcm_orth_optimal_w32_mul(C_11,
         root_11) + dcm_orth_optimal_w32_mul(C_12, root_21)
-        + dcm_orth_optimal_w32_mul(C_13, root_31) + (INT64_C(1) << 31), 32);
+        + dcm_orth_optimal_w32_mul(C_13, root_31));
         /* Q15.16, -2.07e+04 .. 2.07e+04, error 0.00013 */
     /* direction cosine matrix, body to reference, orthonormalized */
     const int64_t next_11_raw = dcm_orth_optimal_w32_shr(dcm_orth_optimal_w32_mul(
@@ -562,9 +598,9 @@ int dcm_orth_optimal_w32(const int32_t computed[9], int32_t orthonormalized[9])
     }
     const int32_t next_11 = dcm_orth_optimal_w32_fit(next_11_raw, 0);
         /* Q1.30, -1.07 .. 1.07, error 0.0023 */
-    const int32_t next_12_factor = dcm_orth_optimal_w32_fit(dcm_orth_optimal_w32_mul(C_11,
+    const int32_t next_12_factor = dcm_orth_optimal_w32_near(dcm_orth_optimal_w32_mul(C_11,
         root_12) + dcm_orth_optimal_w32_mul(C_12, root_22)
-        + dcm_orth_optimal_w32_mul(C_13, root_32) + (INT64_C(1) << 31), 32);
+        + dcm_orth_optimal_w32_mul(C_13, root_32));
         /* Q15.16, -2.07e+04 .. 2.07e+04, error 0.00013 */
     const int64_t next_12_raw = dcm_orth_optimal_w32_shr(dcm_orth_optimal_w32_mul(
         inverse_determinant, next_12_factor) + (INT32_C(1) << 20), 21);
@@ -573,9 +609,9 @@ int dcm_orth_optimal_w32(const int32_t computed[9], int32_t orthonormalized[9])
     }
     const int32_t next_12 = dcm_orth_optimal_w32_fit(next_12_raw, 0);
         /* Q1.30, -1.07 .. 1.07, error 0.0023 */
-    const int32_t next_13_factor = dcm_orth_optimal_w32_fit(dcm_orth_optimal_w32_mul(C_11,
+    const int32_t next_13_factor = dcm_orth_optimal_w32_near(dcm_orth_optimal_w32_mul(C_11,
         root_13) + dcm_orth_optimal_w32_mul(C_12, root_23)
-        + dcm_orth_optimal_w32_mul(C_13, root_33) + (INT64_C(1) << 31), 32);
+        + dcm_orth_optimal_w32_mul(C_13, root_33));
         /* Q15.16, -2.07e+04 .. 2.07e+04, error 0.00013 */
     const int64_t next_13_raw = dcm_orth_optimal_w32_shr(dcm_orth_optimal_w32_mul(
         inverse_determinant, next_13_factor) + (INT32_C(1) << 20), 21);
@@ -584,9 +620,9 @@ int dcm_orth_optimal_w32(const int32_t computed[9], int32_t orthonormalized[9])
     }
     const int32_t next_13 = dcm_orth_optimal_w32_fit(next_13_raw, 0);
         /* Q1.30, -1.07 .. 1.07, error 0.0023 */
-    const int32_t next_21_factor = dcm_orth_optimal_w32_fit(dcm_orth_optimal_w32_mul(C_21,
+    const int32_t next_21_factor = dcm_orth_optimal_w32_near(dcm_orth_optimal_w32_mul(C_21,
         root_11) + dcm_orth_optimal_w32_mul(C_22, root_21)
-        + dcm_orth_optimal_w32_mul(C_23, root_31) + (INT64_C(1) << 31), 32);
+        + dcm_orth_optimal_w32_mul(C_23, root_31));
         /* Q15.16, -2.07e+04 .. 2.07e+04, error 0.00013 */
     const int64_t next_21_raw = dcm_orth_optimal_w32_shr(dcm_orth_optimal_w32_mul(
         inverse_determinant, next_21_factor) + (INT32_C(1) << 20), 21);
@@ -595,9 +631,9 @@ int dcm_orth_optimal_w32(const int32_t computed[9], int32_t orthonormalized[9])
     }
     const int32_t next_21 = dcm_orth_optimal_w32_fit(next_21_raw, 0);
         /* Q1.30, -1.07 .. 1.07, error 0.0023 */
-    const int32_t next_22_factor = dcm_orth_optimal_w32_fit(dcm_orth_optimal_w32_mul(C_21,
+    const int32_t next_22_factor = dcm_orth_optimal_w32_near(dcm_orth_optimal_w32_mul(C_21,
         root_12) + dcm_orth_optimal_w32_mul(C_22, root_22)
-        + dcm_orth_optimal_w32_mul(C_23, root_32) + (INT64_C(1) << 31), 32);
+        + dcm_orth_optimal_w32_mul(C_23, root_32));
         /* Q15.16, -2.07e+04 .. 2.07e+04, error 0.00013 */
     const int64_t next_22_raw = dcm_orth_optimal_w32_shr(dcm_orth_optimal_w32_mul(
         inverse_determinant, next_22_factor) + (INT32_C(1) << 20), 21);
@@ -606,9 +642,9 @@ int dcm_orth_optimal_w32(const int32_t computed[9], int32_t orthonormalized[9])
     }
     const int32_t next_22 = dcm_orth_optimal_w32_fit(next_22_raw, 0);
         /* Q1.30, -1.07 .. 1.07, error 0.0023 */
-    const int32_t next_23_factor = dcm_orth_optimal_w32_fit(dcm_orth_optimal_w32_mul(C_21,
+    const int32_t next_23_factor = dcm_orth_optimal_w32_near(dcm_orth_optimal_w32_mul(C_21,
         root_13) + dcm_orth_optimal_w32_mul(C_22, root_23)
-        + dcm_orth_optimal_w32_mul(C_23, root_33) + (INT64_C(1) << 31), 32);
+        + dcm_orth_optimal_w32_mul(C_23, root_33));
         /* Q15.16, -2.07e+04 .. 2.07e+04, error 0.00013 */
     const int64_t next_23_raw = dcm_orth_optimal_w32_shr(dcm_orth_optimal_w32_mul(
         inverse_determinant, next_23_factor) + (INT32_C(1) << 20), 21);
@@ -617,9 +653,9 @@ int dcm_orth_optimal_w32(const int32_t computed[9], int32_t orthonormalized[9])
     }
     const int32_t next_23 = dcm_orth_optimal_w32_fit(next_23_raw, 0);
         /* Q1.30, -1.07 .. 1.07, error 0.0023 */
-    const int32_t next_31_factor = dcm_orth_optimal_w32_fit(dcm_orth_optimal_w32_mul(C_31,
+    const int32_t next_31_factor = dcm_orth_optimal_w32_near(dcm_orth_optimal_w32_mul(C_31,
         root_11) + dcm_orth_optimal_w32_mul(C_32, root_21)
-        + dcm_orth_optimal_w32_mul(C_33, root_31) + (INT64_C(1) << 31), 32);
+        + dcm_orth_optimal_w32_mul(C_33, root_31));
         /* Q15.16, -2.07e+04 .. 2.07e+04, error 0.00013 */
     const int64_t next_31_raw = dcm_orth_optimal_w32_shr(dcm_orth_optimal_w32_mul(
         inverse_determinant, next_31_factor) + (INT32_C(1) << 20), 21);
@@ -628,9 +664,9 @@ int dcm_orth_optimal_w32(const int32_t computed[9], int32_t orthonormalized[9])
     }
     const int32_t next_31 = dcm_orth_optimal_w32_fit(next_31_raw, 0);
         /* Q1.30, -1.07 .. 1.07, error 0.0023 */
-    const int32_t next_32_factor = dcm_orth_optimal_w32_fit(dcm_orth_optimal_w32_mul(C_31,
+    const int32_t next_32_factor = dcm_orth_optimal_w32_near(dcm_orth_optimal_w32_mul(C_31,
         root_12) + dcm_orth_optimal_w32_mul(C_32, root_22)
-        + dcm_orth_optimal_w32_mul(C_33, root_32) + (INT64_C(1) << 31), 32);
+        + dcm_orth_optimal_w32_mul(C_33, root_32));
         /* Q15.16, -2.07e+04 .. 2.07e+04, error 0.00013 */
     const int64_t next_32_raw = dcm_orth_optimal_w32_shr(dcm_orth_optimal_w32_mul(
         inverse_determinant, next_32_factor) + (INT32_C(1) << 20), 21);
@@ -639,9 +675,9 @@ int dcm_orth_optimal_w32(const int32_t computed[9], int32_t orthonormalized[9])
     }
     const int32_t next_32 = dcm_orth_optimal_w32_fit(next_32_raw, 0);
         /* Q1.30, -1.07 .. 1.07, error 0.0023 */
-    const int32_t next_33_factor = dcm_orth_optimal_w32_fit(dcm_orth_optimal_w32_mul(C_31,
+    const int32_t next_33_factor = dcm_orth_optimal_w32_near(dcm_orth_optimal_w32_mul(C_31,
         root_13) + dcm_orth_optimal_w32_mul(C_32, root_23)
-        + dcm_orth_optimal_w32_mul(C_33, root_33) + (INT64_C(1) << 31), 32);
+        + dcm_orth_optimal_w32_mul(C_33, root_33));
         /* Q15.16, -2.07e+04 .. 2.07e+04, error 0.00013 */
     const int64_t next_33_raw = dcm_orth_optimal_w32_shr(dcm_orth_optimal_w32_mul(
         inverse_determinant, next_33_factor) + (INT32_C(1) << 20), 21);

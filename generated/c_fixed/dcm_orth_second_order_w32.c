@@ -12,7 +12,7 @@
 /* Nonzero if the magnitude of x exceeds the limit. */
 static inline int dcm_orth_second_order_w32_out(int32_t x, int32_t limit)
 {
-#if defined(__GNUC__) && (defined(__ARM_ARCH_6M__) || defined(__ARM_ARCH_8M_BASE__))
+#if defined(__GNUC__) && defined(__arm__)
     return ((uint32_t)x + (uint32_t)limit) > (2u * (uint32_t)limit); /* fewer instructions there */
 #else
     return (x < -limit) || (x > limit);
@@ -74,6 +74,21 @@ static inline int32_t dcm_orth_second_order_w32_fit(int64_t x, int n)
 #endif
 }
 
+/* x / 2^32, to the nearest, where the proof of the ranges shows that it fits into a word: the high
+ * word of x, and one more if the first bit of the low one is set.
+ */
+static inline int32_t dcm_orth_second_order_w32_near(int64_t x)
+{
+#ifdef __FRAMAC__
+    const int64_t moved = x + INT64_C(2147483648);
+    return (int32_t)((moved < 0) ? ~(~moved >> 32) : (moved >> 32));
+#else
+    const uint32_t carry = (uint32_t)x >> 31;
+    const uint32_t bits = (uint32_t)((uint64_t)x >> 32) + carry;
+    return (bits <= (UINT32_MAX >> 1)) ? (int32_t)bits : (-1 - (int32_t)(UINT32_MAX - bits));
+#endif
+}
+
 /* x / 2^n, rounded down, as a wide number. */
 static inline int64_t dcm_orth_second_order_w32_shr(int64_t x, int n)
 {
@@ -132,35 +147,35 @@ int dcm_orth_second_order_w32(const int32_t computed[9], int32_t orthonormalized
     const int64_t shared_2 = dcm_orth_second_order_w32_sqr(excess_13);
         /* Q5.58, -6.31e-09 .. 11.5, error 6.4e-09 */
     /* (C' C - I)^2 */
-    const int32_t excess_squared_11 = dcm_orth_second_order_w32_fit(
-        dcm_orth_second_order_w32_sqr(excess_11) + shared_1 + shared_2
-        + (INT64_C(1) << 31), 32); /* Q5.26, -2.99e-08 .. 28.7, error 2.5e-08 */
+    const int32_t excess_squared_11 = dcm_orth_second_order_w32_near(
+        dcm_orth_second_order_w32_sqr(excess_11) + shared_1 + shared_2);
+        /* Q5.26, -2.99e-08 .. 28.7, error 2.5e-08 */
     const int32_t excess_squared_12_factor = dcm_orth_second_order_w32_fit((int64_t)excess_11
         + (int64_t)excess_22 + 1, 1); /* Q3.28, -2.01 .. 4.78, error 3.8e-09 */
-    const int32_t excess_squared_12 = dcm_orth_second_order_w32_fit(
+    const int32_t excess_squared_12 = dcm_orth_second_order_w32_near(
         dcm_orth_second_order_w32_mul(excess_12, excess_squared_12_factor) * 2
-        + dcm_orth_second_order_w32_mul(excess_13, excess_23) + (INT64_C(1) << 31), 32);
+        + dcm_orth_second_order_w32_mul(excess_13, excess_23));
         /* Q5.26, -27.7 .. 27.7, error 3.1e-08 */
     const int32_t excess_squared_13_factor = dcm_orth_second_order_w32_fit((int64_t)excess_11
         + (int64_t)excess_33 + 1, 1); /* Q3.28, -2.01 .. 4.78, error 3.8e-09 */
-    const int32_t excess_squared_13 = dcm_orth_second_order_w32_fit(
+    const int32_t excess_squared_13 = dcm_orth_second_order_w32_near(
         dcm_orth_second_order_w32_mul(excess_13, excess_squared_13_factor) * 2
-        + dcm_orth_second_order_w32_mul(excess_12, excess_23) + (INT64_C(1) << 31), 32);
+        + dcm_orth_second_order_w32_mul(excess_12, excess_23));
         /* Q5.26, -27.7 .. 27.7, error 3.1e-08 */
     const int64_t shared_3 = dcm_orth_second_order_w32_sqr(excess_23);
         /* Q5.58, -6.31e-09 .. 11.5, error 6.4e-09 */
-    const int32_t excess_squared_22 = dcm_orth_second_order_w32_fit(
-        dcm_orth_second_order_w32_sqr(excess_22) + shared_1 + shared_3
-        + (INT64_C(1) << 31), 32); /* Q5.26, -2.99e-08 .. 28.7, error 2.5e-08 */
+    const int32_t excess_squared_22 = dcm_orth_second_order_w32_near(
+        dcm_orth_second_order_w32_sqr(excess_22) + shared_1 + shared_3);
+        /* Q5.26, -2.99e-08 .. 28.7, error 2.5e-08 */
     const int32_t excess_squared_23_factor = dcm_orth_second_order_w32_fit((int64_t)excess_22
         + (int64_t)excess_33 + 1, 1); /* Q3.28, -2.01 .. 4.78, error 3.8e-09 */
-    const int32_t excess_squared_23 = dcm_orth_second_order_w32_fit(
+    const int32_t excess_squared_23 = dcm_orth_second_order_w32_near(
         dcm_orth_second_order_w32_mul(excess_23, excess_squared_23_factor) * 2
-        + dcm_orth_second_order_w32_mul(excess_12, excess_13) + (INT64_C(1) << 31), 32);
+        + dcm_orth_second_order_w32_mul(excess_12, excess_13));
         /* Q5.26, -27.7 .. 27.7, error 3.1e-08 */
-    const int32_t excess_squared_33 = dcm_orth_second_order_w32_fit(
-        dcm_orth_second_order_w32_sqr(excess_33) + shared_2 + shared_3
-        + (INT64_C(1) << 31), 32); /* Q5.26, -2.99e-08 .. 28.7, error 2.5e-08 */
+    const int32_t excess_squared_33 = dcm_orth_second_order_w32_near(
+        dcm_orth_second_order_w32_sqr(excess_33) + shared_2 + shared_3);
+        /* Q5.26, -2.99e-08 .. 28.7, error 2.5e-08 */
     /* inverse root of C' C to second order */
     const int32_t root_11 = (INT32_C(1) << 27)
         + dcm_orth_second_order_w32_fit(dcm_orth_second_order_w32_mul(excess_squared_11, 3)

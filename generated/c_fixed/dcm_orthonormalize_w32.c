@@ -12,7 +12,7 @@
 /* Nonzero if the magnitude of x exceeds the limit. */
 static inline int dcm_orthonormalize_w32_out(int32_t x, int32_t limit)
 {
-#if defined(__GNUC__) && (defined(__ARM_ARCH_6M__) || defined(__ARM_ARCH_8M_BASE__))
+#if defined(__GNUC__) && defined(__arm__)
     return ((uint32_t)x + (uint32_t)limit) > (2u * (uint32_t)limit); /* fewer instructions there */
 #else
     return (x < -limit) || (x > limit);
@@ -44,6 +44,18 @@ static inline int64_t dcm_orthonormalize_w32_mul(int32_t a, int32_t b)
     return (int64_t)a * (int64_t)b;
 }
 #endif
+
+/* The exact product of two words, times -1. An instruction that accumulates a product takes it
+ * with a negated factor.
+ */
+static inline int64_t dcm_orthonormalize_w32_nml(int32_t a, int32_t b)
+{
+#if defined(__ARM_ARCH_ISA_THUMB) && (__ARM_ARCH_ISA_THUMB > 1)
+    return dcm_orthonormalize_w32_mul(a, -b);
+#else
+    return -dcm_orthonormalize_w32_mul(a, b);
+#endif
+}
 
 /* The exact square of a word. */
 static inline int64_t dcm_orthonormalize_w32_sqr(int32_t a)
@@ -134,13 +146,13 @@ int dcm_orthonormalize_w32(const int32_t computed[9], int32_t orthonormalized[9]
     }
     /* row 1 and its dual, added */
     const int32_t row_1_x = dcm_orthonormalize_w32_fit((int64_t)C_11 * (INT32_C(1) << 30)
-        + dcm_orthonormalize_w32_mul(C_22, C_33) - dcm_orthonormalize_w32_mul(C_23, C_32)
+        + dcm_orthonormalize_w32_mul(C_22, C_33) + dcm_orthonormalize_w32_nml(C_32, C_23)
         + (INT32_C(1) << 30), 31); /* Q2.29, -3.33 .. 3.33, error 9.4e-10 */
     const int32_t row_1_y = dcm_orthonormalize_w32_fit((int64_t)C_12 * (INT32_C(1) << 30)
-        - dcm_orthonormalize_w32_mul(C_21, C_33) + dcm_orthonormalize_w32_mul(C_23, C_31)
+        + dcm_orthonormalize_w32_nml(C_33, C_21) + dcm_orthonormalize_w32_mul(C_23, C_31)
         + (INT32_C(1) << 30), 31); /* Q2.29, -3.33 .. 3.33, error 9.4e-10 */
     const int32_t row_1_z = dcm_orthonormalize_w32_fit((int64_t)C_13 * (INT32_C(1) << 30)
-        + dcm_orthonormalize_w32_mul(C_21, C_32) - dcm_orthonormalize_w32_mul(C_22, C_31)
+        + dcm_orthonormalize_w32_mul(C_21, C_32) + dcm_orthonormalize_w32_nml(C_31, C_22)
         + (INT32_C(1) << 30), 31); /* Q2.29, -3.33 .. 3.33, error 9.4e-10 */
     const int64_t inverse_length_1_radicand = dcm_orthonormalize_w32_shr(
         dcm_orthonormalize_w32_sqr(row_1_x), 1)
@@ -159,13 +171,13 @@ int dcm_orthonormalize_w32(const int32_t computed[9], int32_t orthonormalized[9]
         /* Q0.31, 0.353 .. 0.708, error 3.5e-09 */
     /* row 2 and its dual, added */
     const int32_t row_2_x = dcm_orthonormalize_w32_fit((int64_t)C_21 * (INT32_C(1) << 30)
-        - dcm_orthonormalize_w32_mul(C_12, C_33) + dcm_orthonormalize_w32_mul(C_13, C_32)
+        + dcm_orthonormalize_w32_nml(C_33, C_12) + dcm_orthonormalize_w32_mul(C_13, C_32)
         + (INT32_C(1) << 30), 31); /* Q2.29, -3.33 .. 3.33, error 9.4e-10 */
     const int32_t row_2_y = dcm_orthonormalize_w32_fit((int64_t)C_22 * (INT32_C(1) << 30)
-        + dcm_orthonormalize_w32_mul(C_11, C_33) - dcm_orthonormalize_w32_mul(C_13, C_31)
+        + dcm_orthonormalize_w32_mul(C_11, C_33) + dcm_orthonormalize_w32_nml(C_31, C_13)
         + (INT32_C(1) << 30), 31); /* Q2.29, -3.33 .. 3.33, error 9.4e-10 */
     const int32_t row_2_z = dcm_orthonormalize_w32_fit((int64_t)C_23 * (INT32_C(1) << 30)
-        - dcm_orthonormalize_w32_mul(C_11, C_32) + dcm_orthonormalize_w32_mul(C_12, C_31)
+        + dcm_orthonormalize_w32_nml(C_32, C_11) + dcm_orthonormalize_w32_mul(C_12, C_31)
         + (INT32_C(1) << 30), 31); /* Q2.29, -3.33 .. 3.33, error 9.4e-10 */
     const int64_t inverse_length_2_radicand = dcm_orthonormalize_w32_shr(
         dcm_orthonormalize_w32_sqr(row_2_x), 1)
@@ -184,13 +196,13 @@ int dcm_orthonormalize_w32(const int32_t computed[9], int32_t orthonormalized[9]
         /* Q0.31, 0.353 .. 0.708, error 3.5e-09 */
     /* row 3 and its dual, added */
     const int32_t row_3_x = dcm_orthonormalize_w32_fit((int64_t)C_31 * (INT32_C(1) << 30)
-        + dcm_orthonormalize_w32_mul(C_12, C_23) - dcm_orthonormalize_w32_mul(C_13, C_22)
+        + dcm_orthonormalize_w32_mul(C_12, C_23) + dcm_orthonormalize_w32_nml(C_22, C_13)
         + (INT32_C(1) << 30), 31); /* Q2.29, -3.33 .. 3.33, error 9.4e-10 */
     const int32_t row_3_y = dcm_orthonormalize_w32_fit((int64_t)C_32 * (INT32_C(1) << 30)
-        - dcm_orthonormalize_w32_mul(C_11, C_23) + dcm_orthonormalize_w32_mul(C_13, C_21)
+        + dcm_orthonormalize_w32_nml(C_23, C_11) + dcm_orthonormalize_w32_mul(C_13, C_21)
         + (INT32_C(1) << 30), 31); /* Q2.29, -3.33 .. 3.33, error 9.4e-10 */
     const int32_t row_3_z = dcm_orthonormalize_w32_fit((int64_t)C_33 * (INT32_C(1) << 30)
-        + dcm_orthonormalize_w32_mul(C_11, C_22) - dcm_orthonormalize_w32_mul(C_12, C_21)
+        + dcm_orthonormalize_w32_mul(C_11, C_22) + dcm_orthonormalize_w32_nml(C_21, C_12)
         + (INT32_C(1) << 30), 31); /* Q2.29, -3.33 .. 3.33, error 9.4e-10 */
     const int64_t inverse_length_3_radicand = dcm_orthonormalize_w32_shr(
         dcm_orthonormalize_w32_sqr(row_3_x), 1)

@@ -12,7 +12,7 @@
 /* Nonzero if the magnitude of x exceeds the limit. */
 static inline int dcm_product_w32_out(int32_t x, int32_t limit)
 {
-#if defined(__GNUC__) && (defined(__ARM_ARCH_6M__) || defined(__ARM_ARCH_8M_BASE__))
+#if defined(__GNUC__) && defined(__arm__)
     return ((uint32_t)x + (uint32_t)limit) > (2u * (uint32_t)limit); /* fewer instructions there */
 #else
     return (x < -limit) || (x > limit);
@@ -90,16 +90,7 @@ int dcm_product_w32(const int32_t state[9], const int32_t transition[9], int32_t
     const int32_t A_31 = transition[6];
     const int32_t A_32 = transition[7];
     const int32_t A_33 = transition[8];
-    if (dcm_product_w32_out(C_11, INT32_C(1140850688))
-        || dcm_product_w32_out(C_12, INT32_C(1140850688))
-        || dcm_product_w32_out(C_13, INT32_C(1140850688))
-        || dcm_product_w32_out(C_21, INT32_C(1140850688))
-        || dcm_product_w32_out(C_22, INT32_C(1140850688))
-        || dcm_product_w32_out(C_23, INT32_C(1140850688))
-        || dcm_product_w32_out(C_31, INT32_C(1140850688))
-        || dcm_product_w32_out(C_32, INT32_C(1140850688))
-        || dcm_product_w32_out(C_33, INT32_C(1140850688))
-        || dcm_product_w32_out(A_11, INT32_C(1140850688))
+    if (dcm_product_w32_out(A_11, INT32_C(1140850688))
         || dcm_product_w32_out(A_12, INT32_C(1140850688))
         || dcm_product_w32_out(A_13, INT32_C(1140850688))
         || dcm_product_w32_out(A_21, INT32_C(1140850688))
@@ -107,7 +98,16 @@ int dcm_product_w32(const int32_t state[9], const int32_t transition[9], int32_t
         || dcm_product_w32_out(A_23, INT32_C(1140850688))
         || dcm_product_w32_out(A_31, INT32_C(1140850688))
         || dcm_product_w32_out(A_32, INT32_C(1140850688))
-        || dcm_product_w32_out(A_33, INT32_C(1140850688))) {
+        || dcm_product_w32_out(A_33, INT32_C(1140850688))
+        || dcm_product_w32_out(C_11, INT32_C(1140850688))
+        || dcm_product_w32_out(C_12, INT32_C(1140850688))
+        || dcm_product_w32_out(C_13, INT32_C(1140850688))
+        || dcm_product_w32_out(C_21, INT32_C(1140850688))
+        || dcm_product_w32_out(C_22, INT32_C(1140850688))
+        || dcm_product_w32_out(C_23, INT32_C(1140850688))
+        || dcm_product_w32_out(C_31, INT32_C(1140850688))
+        || dcm_product_w32_out(C_32, INT32_C(1140850688))
+        || dcm_product_w32_out(C_33, INT32_C(1140850688))) {
         return 1;
     }
     /* direction cosine matrix, body to reference, after the step */

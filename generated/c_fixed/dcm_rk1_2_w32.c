@@ -12,7 +12,7 @@
 /* Nonzero if the magnitude of x exceeds the limit. */
 static inline int dcm_rk1_2_w32_out(int32_t x, int32_t limit)
 {
-#if defined(__GNUC__) && (defined(__ARM_ARCH_6M__) || defined(__ARM_ARCH_8M_BASE__))
+#if defined(__GNUC__) && defined(__arm__)
     return ((uint32_t)x + (uint32_t)limit) > (2u * (uint32_t)limit); /* fewer instructions there */
 #else
     return (x < -limit) || (x > limit);
@@ -87,7 +87,13 @@ int dcm_rk1_2_w32(const int32_t state[9], const int32_t increments[6], int32_t n
     const int32_t d2_x = increments[3];
     const int32_t d2_y = increments[4];
     const int32_t d2_z = increments[5];
-    if (dcm_rk1_2_w32_out(C_11, INT32_C(1140850688))
+    if (dcm_rk1_2_w32_out(d1_x, (INT32_C(1) << 30))
+        || dcm_rk1_2_w32_out(d1_y, (INT32_C(1) << 30))
+        || dcm_rk1_2_w32_out(d1_z, (INT32_C(1) << 30))
+        || dcm_rk1_2_w32_out(d2_x, (INT32_C(1) << 30))
+        || dcm_rk1_2_w32_out(d2_y, (INT32_C(1) << 30))
+        || dcm_rk1_2_w32_out(d2_z, (INT32_C(1) << 30))
+        || dcm_rk1_2_w32_out(C_11, INT32_C(1140850688))
         || dcm_rk1_2_w32_out(C_12, INT32_C(1140850688))
         || dcm_rk1_2_w32_out(C_13, INT32_C(1140850688))
         || dcm_rk1_2_w32_out(C_21, INT32_C(1140850688))
@@ -95,13 +101,7 @@ int dcm_rk1_2_w32(const int32_t state[9], const int32_t increments[6], int32_t n
         || dcm_rk1_2_w32_out(C_23, INT32_C(1140850688))
         || dcm_rk1_2_w32_out(C_31, INT32_C(1140850688))
         || dcm_rk1_2_w32_out(C_32, INT32_C(1140850688))
-        || dcm_rk1_2_w32_out(C_33, INT32_C(1140850688))
-        || dcm_rk1_2_w32_out(d1_x, (INT32_C(1) << 30))
-        || dcm_rk1_2_w32_out(d1_y, (INT32_C(1) << 30))
-        || dcm_rk1_2_w32_out(d1_z, (INT32_C(1) << 30))
-        || dcm_rk1_2_w32_out(d2_x, (INT32_C(1) << 30))
-        || dcm_rk1_2_w32_out(d2_y, (INT32_C(1) << 30))
-        || dcm_rk1_2_w32_out(d2_z, (INT32_C(1) << 30))) {
+        || dcm_rk1_2_w32_out(C_33, INT32_C(1140850688))) {
         return 1;
     }
     /* rate times the step, at node 0 */

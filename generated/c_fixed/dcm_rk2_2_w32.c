@@ -12,7 +12,7 @@
 /* Nonzero if the magnitude of x exceeds the limit. */
 static inline int dcm_rk2_2_w32_out(int32_t x, int32_t limit)
 {
-#if defined(__GNUC__) && (defined(__ARM_ARCH_6M__) || defined(__ARM_ARCH_8M_BASE__))
+#if defined(__GNUC__) && defined(__arm__)
     return ((uint32_t)x + (uint32_t)limit) > (2u * (uint32_t)limit); /* fewer instructions there */
 #else
     return (x < -limit) || (x > limit);
@@ -64,6 +64,27 @@ static inline int32_t dcm_rk2_2_w32_fit(int64_t x, int n)
 #endif
 }
 
+/* x / 2^32, to the nearest, where the proof of the ranges shows that it fits into a word: the high
+ * word of x, and one more if the first bit of the low one is set.
+ */
+static inline int32_t dcm_rk2_2_w32_near(int64_t x)
+{
+#ifdef __FRAMAC__
+    const int64_t moved = x + INT64_C(2147483648);
+    return (int32_t)((moved < 0) ? ~(~moved >> 32) : (moved >> 32));
+#else
+    const uint32_t carry = (uint32_t)x >> 31;
+    const uint32_t bits = (uint32_t)((uint64_t)x >> 32) + carry;
+    return (bits <= (UINT32_MAX >> 1)) ? (int32_t)bits : (-1 - (int32_t)(UINT32_MAX - bits));
+#endif
+}
+
+/* x / 2^n of a word, rounded down. */
+static inline int32_t dcm_rk2_2_w32_asr(int32_t x, int n)
+{
+    return (x >= 0) ? (x >> n) : ~(~x >> n);
+}
+
 /* x / 2^n, rounded down, as a wide number. */
 static inline int64_t dcm_rk2_2_w32_shr(int64_t x, int n)
 {
@@ -87,7 +108,13 @@ int dcm_rk2_2_w32(const int32_t state[9], const int32_t increments[6], int32_t n
     const int32_t d2_x = increments[3];
     const int32_t d2_y = increments[4];
     const int32_t d2_z = increments[5];
-    if (dcm_rk2_2_w32_out(C_11, INT32_C(1140850688))
+    if (dcm_rk2_2_w32_out(d1_x, (INT32_C(1) << 30))
+        || dcm_rk2_2_w32_out(d1_y, (INT32_C(1) << 30))
+        || dcm_rk2_2_w32_out(d1_z, (INT32_C(1) << 30))
+        || dcm_rk2_2_w32_out(d2_x, (INT32_C(1) << 30))
+        || dcm_rk2_2_w32_out(d2_y, (INT32_C(1) << 30))
+        || dcm_rk2_2_w32_out(d2_z, (INT32_C(1) << 30))
+        || dcm_rk2_2_w32_out(C_11, INT32_C(1140850688))
         || dcm_rk2_2_w32_out(C_12, INT32_C(1140850688))
         || dcm_rk2_2_w32_out(C_13, INT32_C(1140850688))
         || dcm_rk2_2_w32_out(C_21, INT32_C(1140850688))
@@ -95,35 +122,29 @@ int dcm_rk2_2_w32(const int32_t state[9], const int32_t increments[6], int32_t n
         || dcm_rk2_2_w32_out(C_23, INT32_C(1140850688))
         || dcm_rk2_2_w32_out(C_31, INT32_C(1140850688))
         || dcm_rk2_2_w32_out(C_32, INT32_C(1140850688))
-        || dcm_rk2_2_w32_out(C_33, INT32_C(1140850688))
-        || dcm_rk2_2_w32_out(d1_x, (INT32_C(1) << 30))
-        || dcm_rk2_2_w32_out(d1_y, (INT32_C(1) << 30))
-        || dcm_rk2_2_w32_out(d1_z, (INT32_C(1) << 30))
-        || dcm_rk2_2_w32_out(d2_x, (INT32_C(1) << 30))
-        || dcm_rk2_2_w32_out(d2_y, (INT32_C(1) << 30))
-        || dcm_rk2_2_w32_out(d2_z, (INT32_C(1) << 30))) {
+        || dcm_rk2_2_w32_out(C_33, INT32_C(1140850688))) {
         return 1;
     }
     /* rate times the step, at node 0, times 1/3 */
-    const int32_t turn_0_scaled_x = d1_x
-        + dcm_rk2_2_w32_fit(-dcm_rk2_2_w32_mul(d2_x, INT32_C(1431655765) /* 1/3 in Q32 */)
-        + (INT64_C(1) << 31), 32); /* Q-2.33, -0.167 .. 0.167, error 6.8e-11 */
-    const int32_t turn_0_scaled_y = d1_y
-        + dcm_rk2_2_w32_fit(-dcm_rk2_2_w32_mul(d2_y, INT32_C(1431655765) /* 1/3 in Q32 */)
-        + (INT64_C(1) << 31), 32); /* Q-2.33, -0.167 .. 0.167, error 6.8e-11 */
-    const int32_t turn_0_scaled_z = d1_z
-        + dcm_rk2_2_w32_fit(-dcm_rk2_2_w32_mul(d2_z, INT32_C(1431655765) /* 1/3 in Q32 */)
-        + (INT64_C(1) << 31), 32); /* Q-2.33, -0.167 .. 0.167, error 6.8e-11 */
+    const int32_t turn_0_scaled_x = d1_x + dcm_rk2_2_w32_near(dcm_rk2_2_w32_mul(d2_x,
+        (-INT32_C(1431655765)) /* -1/3 in Q32 */));
+        /* Q-2.33, -0.167 .. 0.167, error 6.8e-11 */
+    const int32_t turn_0_scaled_y = d1_y + dcm_rk2_2_w32_near(dcm_rk2_2_w32_mul(d2_y,
+        (-INT32_C(1431655765)) /* -1/3 in Q32 */));
+        /* Q-2.33, -0.167 .. 0.167, error 6.8e-11 */
+    const int32_t turn_0_scaled_z = d1_z + dcm_rk2_2_w32_near(dcm_rk2_2_w32_mul(d2_z,
+        (-INT32_C(1431655765)) /* -1/3 in Q32 */));
+        /* Q-2.33, -0.167 .. 0.167, error 6.8e-11 */
     /* rate times the step, at node 1, times -1/3 */
     const int32_t turn_1_scaled_x = -d2_x
-        + dcm_rk2_2_w32_fit(dcm_rk2_2_w32_mul(d1_x, INT32_C(1431655765) /* 1/3 in Q32 */)
-        + (INT64_C(1) << 31), 32); /* Q-2.33, -0.167 .. 0.167, error 6.8e-11 */
+        + dcm_rk2_2_w32_near(dcm_rk2_2_w32_mul(d1_x, INT32_C(1431655765) /* 1/3 in Q32 */));
+        /* Q-2.33, -0.167 .. 0.167, error 6.8e-11 */
     const int32_t turn_1_scaled_y = -d2_y
-        + dcm_rk2_2_w32_fit(dcm_rk2_2_w32_mul(d1_y, INT32_C(1431655765) /* 1/3 in Q32 */)
-        + (INT64_C(1) << 31), 32); /* Q-2.33, -0.167 .. 0.167, error 6.8e-11 */
+        + dcm_rk2_2_w32_near(dcm_rk2_2_w32_mul(d1_y, INT32_C(1431655765) /* 1/3 in Q32 */));
+        /* Q-2.33, -0.167 .. 0.167, error 6.8e-11 */
     const int32_t turn_1_scaled_z = -d2_z
-        + dcm_rk2_2_w32_fit(dcm_rk2_2_w32_mul(d1_z, INT32_C(1431655765) /* 1/3 in Q32 */)
-        + (INT64_C(1) << 31), 32); /* Q-2.33, -0.167 .. 0.167, error 6.8e-11 */
+        + dcm_rk2_2_w32_near(dcm_rk2_2_w32_mul(d1_z, INT32_C(1431655765) /* 1/3 in Q32 */));
+        /* Q-2.33, -0.167 .. 0.167, error 6.8e-11 */
     /* the angle increment of the whole step */
     const int64_t sigma_x = (int64_t)d1_x + (int64_t)d2_x; /* Q30.33, -0.25 .. 0.25, exact */
     const int64_t sigma_y = (int64_t)d1_y + (int64_t)d2_y; /* Q30.33, -0.25 .. 0.25, exact */
@@ -133,49 +154,46 @@ int dcm_rk2_2_w32(const int32_t state[9], const int32_t increments[6], int32_t n
     const int64_t skew_y = sigma_y; /* Q30.33, -0.25 .. 0.25, exact */
     const int64_t skew_z = sigma_z; /* Q30.33, -0.25 .. 0.25, exact */
     /* left of turn_0_scaled in an outer product */
-    const int32_t partner_left_x = dcm_rk2_2_w32_fit(-dcm_rk2_2_w32_mul(turn_1_scaled_x, 9)
+    const int32_t partner_left_x = dcm_rk2_2_w32_fit(dcm_rk2_2_w32_mul(turn_1_scaled_x, (-9))
         + 4, 3); /* Q0.31, -0.751 .. 0.751, error 5.4e-10 */
-    const int32_t partner_left_y = dcm_rk2_2_w32_fit(-dcm_rk2_2_w32_mul(turn_1_scaled_y, 9)
+    const int32_t partner_left_y = dcm_rk2_2_w32_fit(dcm_rk2_2_w32_mul(turn_1_scaled_y, (-9))
         + 4, 3); /* Q0.31, -0.751 .. 0.751, error 5.4e-10 */
-    const int32_t partner_left_z = dcm_rk2_2_w32_fit(-dcm_rk2_2_w32_mul(turn_1_scaled_z, 9)
+    const int32_t partner_left_z = dcm_rk2_2_w32_fit(dcm_rk2_2_w32_mul(turn_1_scaled_z, (-9))
         + 4, 3); /* Q0.31, -0.751 .. 0.751, error 5.4e-10 */
-    const int32_t turn_0_scaled_dot_turn_1_scaled = dcm_rk2_2_w32_fit(dcm_rk2_2_w32_mul(
+    const int32_t turn_0_scaled_dot_turn_1_scaled = dcm_rk2_2_w32_near(dcm_rk2_2_w32_mul(
         turn_0_scaled_x, turn_1_scaled_x)
         + dcm_rk2_2_w32_mul(turn_0_scaled_y, turn_1_scaled_y)
-        + dcm_rk2_2_w32_mul(turn_0_scaled_z, turn_1_scaled_z) + (INT64_C(1) << 31), 32);
+        + dcm_rk2_2_w32_mul(turn_0_scaled_z, turn_1_scaled_z));
         /* Q-3.34, -0.0521 .. 0.0834, error 9.8e-11 */
     /* multiple of the unit matrix */
     const int64_t diagonal = dcm_rk2_2_w32_mul(turn_0_scaled_dot_turn_1_scaled, 9);
         /* Q28.35, -0.235 .. 0.376, error 4.4e-10; stores diagonal - 1 */
-    const int32_t A_11 = (INT32_C(1) << 30)
-        + dcm_rk2_2_w32_fit(dcm_rk2_2_w32_shr(dcm_rk2_2_w32_mul(partner_left_x,
-        turn_0_scaled_x), 1) + diagonal * (INT32_C(1) << 28) + (INT64_C(1) << 32), 33);
-        /* Q1.30, 0.843 .. 1.26, error 1.1e-09 */
-    const int32_t A_22 = (INT32_C(1) << 30)
-        + dcm_rk2_2_w32_fit(dcm_rk2_2_w32_shr(dcm_rk2_2_w32_mul(partner_left_y,
-        turn_0_scaled_y), 1) + diagonal * (INT32_C(1) << 28) + (INT64_C(1) << 32), 33);
-        /* Q1.30, 0.843 .. 1.26, error 1.1e-09 */
-    const int32_t A_33 = (INT32_C(1) << 30)
-        + dcm_rk2_2_w32_fit(dcm_rk2_2_w32_shr(dcm_rk2_2_w32_mul(partner_left_z,
-        turn_0_scaled_z), 1) + diagonal * (INT32_C(1) << 28) + (INT64_C(1) << 32), 33);
-        /* Q1.30, 0.843 .. 1.26, error 1.1e-09 */
-    const int32_t A_12 = dcm_rk2_2_w32_fit(dcm_rk2_2_w32_mul(partner_left_x, turn_0_scaled_y)
-        - skew_z * (INT64_C(1) << 31) + (INT64_C(1) << 33), 34);
+    const int32_t A_11 = (INT32_C(1) << 30) + dcm_rk2_2_w32_asr(dcm_rk2_2_w32_fit(
+        dcm_rk2_2_w32_shr(dcm_rk2_2_w32_mul(partner_left_x, turn_0_scaled_x), 1)
+        + diagonal * (INT32_C(1) << 28), 32) + 1, 1); /* Q1.30, 0.843 .. 1.26, error 1.1e-09 */
+    const int32_t A_22 = (INT32_C(1) << 30) + dcm_rk2_2_w32_asr(dcm_rk2_2_w32_fit(
+        dcm_rk2_2_w32_shr(dcm_rk2_2_w32_mul(partner_left_y, turn_0_scaled_y), 1)
+        + diagonal * (INT32_C(1) << 28), 32) + 1, 1); /* Q1.30, 0.843 .. 1.26, error 1.1e-09 */
+    const int32_t A_33 = (INT32_C(1) << 30) + dcm_rk2_2_w32_asr(dcm_rk2_2_w32_fit(
+        dcm_rk2_2_w32_shr(dcm_rk2_2_w32_mul(partner_left_z, turn_0_scaled_z), 1)
+        + diagonal * (INT32_C(1) << 28), 32) + 1, 1); /* Q1.30, 0.843 .. 1.26, error 1.1e-09 */
+    const int32_t A_12 = dcm_rk2_2_w32_asr(dcm_rk2_2_w32_fit(dcm_rk2_2_w32_mul(partner_left_x,
+        turn_0_scaled_y) - skew_z * (INT64_C(1) << 31), 32) + 2, 2);
         /* Q1.30, -0.376 .. 0.376, error 6.1e-10 */
-    const int32_t A_21 = dcm_rk2_2_w32_fit(dcm_rk2_2_w32_mul(partner_left_y, turn_0_scaled_x)
-        + skew_z * (INT64_C(1) << 31) + (INT64_C(1) << 33), 34);
+    const int32_t A_21 = dcm_rk2_2_w32_asr(dcm_rk2_2_w32_fit(dcm_rk2_2_w32_mul(partner_left_y,
+        turn_0_scaled_x) + skew_z * (INT64_C(1) << 31), 32) + 2, 2);
         /* Q1.30, -0.376 .. 0.376, error 6.1e-10 */
-    const int32_t A_23 = dcm_rk2_2_w32_fit(dcm_rk2_2_w32_mul(partner_left_y, turn_0_scaled_z)
-        - skew_x * (INT64_C(1) << 31) + (INT64_C(1) << 33), 34);
+    const int32_t A_23 = dcm_rk2_2_w32_asr(dcm_rk2_2_w32_fit(dcm_rk2_2_w32_mul(partner_left_y,
+        turn_0_scaled_z) - skew_x * (INT64_C(1) << 31), 32) + 2, 2);
         /* Q1.30, -0.376 .. 0.376, error 6.1e-10 */
-    const int32_t A_32 = dcm_rk2_2_w32_fit(dcm_rk2_2_w32_mul(partner_left_z, turn_0_scaled_y)
-        + skew_x * (INT64_C(1) << 31) + (INT64_C(1) << 33), 34);
+    const int32_t A_32 = dcm_rk2_2_w32_asr(dcm_rk2_2_w32_fit(dcm_rk2_2_w32_mul(partner_left_z,
+        turn_0_scaled_y) + skew_x * (INT64_C(1) << 31), 32) + 2, 2);
         /* Q1.30, -0.376 .. 0.376, error 6.1e-10 */
-    const int32_t A_31 = dcm_rk2_2_w32_fit(dcm_rk2_2_w32_mul(partner_left_z, turn_0_scaled_x)
-        - skew_y * (INT64_C(1) << 31) + (INT64_C(1) << 33), 34);
+    const int32_t A_31 = dcm_rk2_2_w32_asr(dcm_rk2_2_w32_fit(dcm_rk2_2_w32_mul(partner_left_z,
+        turn_0_scaled_x) - skew_y * (INT64_C(1) << 31), 32) + 2, 2);
         /* Q1.30, -0.376 .. 0.376, error 6.1e-10 */
-    const int32_t A_13 = dcm_rk2_2_w32_fit(dcm_rk2_2_w32_mul(partner_left_x, turn_0_scaled_z)
-        + skew_y * (INT64_C(1) << 31) + (INT64_C(1) << 33), 34);
+    const int32_t A_13 = dcm_rk2_2_w32_asr(dcm_rk2_2_w32_fit(dcm_rk2_2_w32_mul(partner_left_x,
+        turn_0_scaled_z) + skew_y * (INT64_C(1) << 31), 32) + 2, 2);
         /* Q1.30, -0.376 .. 0.376, error 6.1e-10 */
     /* direction cosine matrix, body to reference, after the step */
     const int64_t next_11_raw = dcm_rk2_2_w32_shr(dcm_rk2_2_w32_mul(A_11, C_11)

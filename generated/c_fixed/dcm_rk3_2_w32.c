@@ -13,7 +13,7 @@
 /* Nonzero if the magnitude of x exceeds the limit. */
 static inline int dcm_rk3_2_w32_out(int32_t x, int32_t limit)
 {
-#if defined(__GNUC__) && (defined(__ARM_ARCH_6M__) || defined(__ARM_ARCH_8M_BASE__))
+#if defined(__GNUC__) && defined(__arm__)
     return ((uint32_t)x + (uint32_t)limit) > (2u * (uint32_t)limit); /* fewer instructions there */
 #else
     return (x < -limit) || (x > limit);
@@ -46,6 +46,18 @@ static inline int64_t dcm_rk3_2_w32_mul(int32_t a, int32_t b)
 }
 #endif
 
+/* The exact product of two words, times -1. An instruction that accumulates a product takes it
+ * with a negated factor.
+ */
+static inline int64_t dcm_rk3_2_w32_nml(int32_t a, int32_t b)
+{
+#if defined(__ARM_ARCH_ISA_THUMB) && (__ARM_ARCH_ISA_THUMB > 1)
+    return dcm_rk3_2_w32_mul(a, -b);
+#else
+    return -dcm_rk3_2_w32_mul(a, b);
+#endif
+}
+
 /* The exact square of a word. */
 static inline int64_t dcm_rk3_2_w32_sqr(int32_t a)
 {
@@ -75,6 +87,27 @@ static inline int32_t dcm_rk3_2_w32_fit(int64_t x, int n)
 #endif
 }
 
+/* x / 2^32, to the nearest, where the proof of the ranges shows that it fits into a word: the high
+ * word of x, and one more if the first bit of the low one is set.
+ */
+static inline int32_t dcm_rk3_2_w32_near(int64_t x)
+{
+#ifdef __FRAMAC__
+    const int64_t moved = x + INT64_C(2147483648);
+    return (int32_t)((moved < 0) ? ~(~moved >> 32) : (moved >> 32));
+#else
+    const uint32_t carry = (uint32_t)x >> 31;
+    const uint32_t bits = (uint32_t)((uint64_t)x >> 32) + carry;
+    return (bits <= (UINT32_MAX >> 1)) ? (int32_t)bits : (-1 - (int32_t)(UINT32_MAX - bits));
+#endif
+}
+
+/* x / 2^n of a word, rounded down. */
+static inline int32_t dcm_rk3_2_w32_asr(int32_t x, int n)
+{
+    return (x >= 0) ? (x >> n) : ~(~x >> n);
+}
+
 /* x / 2^n, rounded down, as a wide number. */
 static inline int64_t dcm_rk3_2_w32_shr(int64_t x, int n)
 {
@@ -98,7 +131,13 @@ int dcm_rk3_2_w32(const int32_t state[9], const int32_t increments[6], int32_t n
     const int32_t d2_x = increments[3];
     const int32_t d2_y = increments[4];
     const int32_t d2_z = increments[5];
-    if (dcm_rk3_2_w32_out(C_11, INT32_C(1140850688))
+    if (dcm_rk3_2_w32_out(d1_x, (INT32_C(1) << 29))
+        || dcm_rk3_2_w32_out(d1_y, (INT32_C(1) << 29))
+        || dcm_rk3_2_w32_out(d1_z, (INT32_C(1) << 29))
+        || dcm_rk3_2_w32_out(d2_x, (INT32_C(1) << 29))
+        || dcm_rk3_2_w32_out(d2_y, (INT32_C(1) << 29))
+        || dcm_rk3_2_w32_out(d2_z, (INT32_C(1) << 29))
+        || dcm_rk3_2_w32_out(C_11, INT32_C(1140850688))
         || dcm_rk3_2_w32_out(C_12, INT32_C(1140850688))
         || dcm_rk3_2_w32_out(C_13, INT32_C(1140850688))
         || dcm_rk3_2_w32_out(C_21, INT32_C(1140850688))
@@ -106,13 +145,7 @@ int dcm_rk3_2_w32(const int32_t state[9], const int32_t increments[6], int32_t n
         || dcm_rk3_2_w32_out(C_23, INT32_C(1140850688))
         || dcm_rk3_2_w32_out(C_31, INT32_C(1140850688))
         || dcm_rk3_2_w32_out(C_32, INT32_C(1140850688))
-        || dcm_rk3_2_w32_out(C_33, INT32_C(1140850688))
-        || dcm_rk3_2_w32_out(d1_x, (INT32_C(1) << 29))
-        || dcm_rk3_2_w32_out(d1_y, (INT32_C(1) << 29))
-        || dcm_rk3_2_w32_out(d1_z, (INT32_C(1) << 29))
-        || dcm_rk3_2_w32_out(d2_x, (INT32_C(1) << 29))
-        || dcm_rk3_2_w32_out(d2_y, (INT32_C(1) << 29))
-        || dcm_rk3_2_w32_out(d2_z, (INT32_C(1) << 29))) {
+        || dcm_rk3_2_w32_out(C_33, INT32_C(1140850688))) {
         return 1;
     }
     /* the angle increment of the whole step */
@@ -124,20 +157,20 @@ int dcm_rk3_2_w32(const int32_t state[9], const int32_t increments[6], int32_t n
     const int32_t delta_y = d1_y - d2_y; /* Q-1.32, -0.25 .. 0.25, exact */
     const int32_t delta_z = d1_z - d2_z; /* Q-1.32, -0.25 .. 0.25, exact */
     const int32_t delta_cross_sigma_x = dcm_rk3_2_w32_fit(dcm_rk3_2_w32_mul(delta_y, sigma_z)
-        - dcm_rk3_2_w32_mul(delta_z, sigma_y) + (INT32_C(1) << 29), 30);
+        + dcm_rk3_2_w32_nml(sigma_y, delta_z) + (INT32_C(1) << 29), 30);
         /* Q-3.34, -0.0626 .. 0.0626, error 3e-11 */
     const int32_t delta_cross_sigma_y = dcm_rk3_2_w32_fit(dcm_rk3_2_w32_mul(delta_z, sigma_x)
-        - dcm_rk3_2_w32_mul(delta_x, sigma_z) + (INT32_C(1) << 29), 30);
+        + dcm_rk3_2_w32_nml(sigma_z, delta_x) + (INT32_C(1) << 29), 30);
         /* Q-3.34, -0.0626 .. 0.0626, error 3e-11 */
     const int32_t delta_cross_sigma_z = dcm_rk3_2_w32_fit(dcm_rk3_2_w32_mul(delta_x, sigma_y)
-        - dcm_rk3_2_w32_mul(delta_y, sigma_x) + (INT32_C(1) << 29), 30);
+        + dcm_rk3_2_w32_nml(sigma_x, delta_y) + (INT32_C(1) << 29), 30);
         /* Q-3.34, -0.0626 .. 0.0626, error 3e-11 */
     const int32_t sigma_dot_sigma = dcm_rk3_2_w32_fit(dcm_rk3_2_w32_sqr(sigma_x)
         + dcm_rk3_2_w32_sqr(sigma_y) + dcm_rk3_2_w32_sqr(sigma_z) + (INT32_C(1) << 30), 31);
         /* Q-2.33, -1.17e-10 .. 0.188, error 5.9e-11 */
     /* weight of sigma in skew */
-    const int32_t skew_sigma = dcm_rk3_2_w32_fit(-dcm_rk3_2_w32_mul(sigma_dot_sigma,
-        INT32_C(1431655765) /* 1/6 in Q33 */) + (INT32_C(1) << 30), 31);
+    const int32_t skew_sigma = dcm_rk3_2_w32_fit(dcm_rk3_2_w32_mul(sigma_dot_sigma,
+        (-INT32_C(1431655765)) /* -1/6 in Q33 */) + (INT32_C(1) << 30), 31);
         /* Q-4.35, -0.0313 .. 5.83e-11, error 3.2e-11; stores skew_sigma - 1 */
     const int32_t sigma_dot_delta = dcm_rk3_2_w32_fit(dcm_rk3_2_w32_mul(delta_x, sigma_x)
         + dcm_rk3_2_w32_mul(delta_y, sigma_y) + dcm_rk3_2_w32_mul(delta_z, sigma_z)
@@ -166,12 +199,12 @@ int dcm_rk3_2_w32(const int32_t state[9], const int32_t increments[6], int32_t n
         + dcm_rk3_2_w32_shr(dcm_rk3_2_w32_mul(delta_z, skew_delta), 3)
         + dcm_rk3_2_w32_shr(shared_3, 2); /* Q-1.64, -0.287 .. 0.287, error 3.1e-11 */
     /* of sigma in outer products */
-    const int32_t partner_sigma_x = sigma_x + dcm_rk3_2_w32_fit(shared_1
-        + (INT64_C(1) << 31), 32); /* Q-3.34, -0.0834 .. 0.0834, error 4.4e-11 */
-    const int32_t partner_sigma_y = sigma_y + dcm_rk3_2_w32_fit(shared_2
-        + (INT64_C(1) << 31), 32); /* Q-3.34, -0.0834 .. 0.0834, error 4.4e-11 */
-    const int32_t partner_sigma_z = sigma_z + dcm_rk3_2_w32_fit(shared_3
-        + (INT64_C(1) << 31), 32); /* Q-3.34, -0.0834 .. 0.0834, error 4.4e-11 */
+    const int32_t partner_sigma_x = sigma_x + dcm_rk3_2_w32_near(shared_1);
+        /* Q-3.34, -0.0834 .. 0.0834, error 4.4e-11 */
+    const int32_t partner_sigma_y = sigma_y + dcm_rk3_2_w32_near(shared_2);
+        /* Q-3.34, -0.0834 .. 0.0834, error 4.4e-11 */
+    const int32_t partner_sigma_z = sigma_z + dcm_rk3_2_w32_near(shared_3);
+        /* Q-3.34, -0.0834 .. 0.0834, error 4.4e-11 */
     /* of delta in outer products */
     const int32_t partner_delta_x = dcm_rk3_2_w32_fit(dcm_rk3_2_w32_mul(delta_x,
         INT32_C(1431655765) /* 2/3 in Q31 */) + (INT32_C(1) << 29), 30);
@@ -186,50 +219,50 @@ int dcm_rk3_2_w32(const int32_t state[9], const int32_t increments[6], int32_t n
         + dcm_rk3_2_w32_sqr(delta_y) + dcm_rk3_2_w32_sqr(delta_z) + (INT32_C(1) << 30), 31);
         /* Q-2.33, -1.17e-10 .. 0.188, error 5.9e-11 */
     /* multiple of the unit matrix */
-    const int64_t diagonal = -dcm_rk3_2_w32_mul(delta_dot_delta,
-        INT32_C(1431655765) /* 2/3 in Q31 */)
+    const int64_t diagonal = dcm_rk3_2_w32_mul(delta_dot_delta,
+        (-INT32_C(1431655765)) /* -2/3 in Q31 */)
         - (int64_t)sigma_dot_sigma * (INT32_C(1) << 30);
         /* Q-1.64, -0.126 .. 9.71e-11, error 9.8e-11; stores diagonal - 1 */
     /* half of u y' + y u' on the diagonal */
     const int64_t half_xx = dcm_rk3_2_w32_mul(partner_sigma_x, sigma_x);
         /* Q-3.66, -0.0209 .. 0.0209, error 1.1e-11 */
-    const int32_t A_11 = dcm_rk3_2_w32_fit(dcm_rk3_2_w32_mul(delta_x, partner_delta_x) + half_xx
-        + diagonal * 2 + (INT64_C(1) << 32), 33);
+    const int32_t A_11 = dcm_rk3_2_w32_asr(dcm_rk3_2_w32_fit(dcm_rk3_2_w32_mul(delta_x,
+        partner_delta_x) + half_xx + diagonal * 2, 32) + 1, 1);
         /* Q-1.32, -0.209 .. 0.0834, error 2.6e-10; stores A_11 - 1 */
     const int64_t half_yy = dcm_rk3_2_w32_mul(partner_sigma_y, sigma_y);
         /* Q-3.66, -0.0209 .. 0.0209, error 1.1e-11 */
-    const int32_t A_22 = dcm_rk3_2_w32_fit(dcm_rk3_2_w32_mul(delta_y, partner_delta_y) + half_yy
-        + diagonal * 2 + (INT64_C(1) << 32), 33);
+    const int32_t A_22 = dcm_rk3_2_w32_asr(dcm_rk3_2_w32_fit(dcm_rk3_2_w32_mul(delta_y,
+        partner_delta_y) + half_yy + diagonal * 2, 32) + 1, 1);
         /* Q-1.32, -0.209 .. 0.0834, error 2.6e-10; stores A_22 - 1 */
     const int64_t half_zz = dcm_rk3_2_w32_mul(partner_sigma_z, sigma_z);
         /* Q-3.66, -0.0209 .. 0.0209, error 1.1e-11 */
-    const int32_t A_33 = dcm_rk3_2_w32_fit(dcm_rk3_2_w32_mul(delta_z, partner_delta_z) + half_zz
-        + diagonal * 2 + (INT64_C(1) << 32), 33);
+    const int32_t A_33 = dcm_rk3_2_w32_asr(dcm_rk3_2_w32_fit(dcm_rk3_2_w32_mul(delta_z,
+        partner_delta_z) + half_zz + diagonal * 2, 32) + 1, 1);
         /* Q-1.32, -0.209 .. 0.0834, error 2.6e-10; stores A_33 - 1 */
     const int64_t symmetric_xy = dcm_rk3_2_w32_mul(partner_sigma_y, sigma_x)
         + dcm_rk3_2_w32_mul(delta_x, partner_delta_y) * 2
         + dcm_rk3_2_w32_mul(partner_sigma_x, sigma_y);
         /* Q-3.66, -0.0547 .. 0.0547, error 4.7e-11 */
-    const int32_t A_12 = dcm_rk3_2_w32_fit(dcm_rk3_2_w32_shr(symmetric_xy, 2) - skew_z
-        + (INT64_C(1) << 31), 32); /* Q-1.32, -0.342 .. 0.342, error 2e-10 */
-    const int32_t A_21 = dcm_rk3_2_w32_fit(dcm_rk3_2_w32_shr(symmetric_xy, 2) + skew_z
-        + (INT64_C(1) << 31), 32); /* Q-1.32, -0.342 .. 0.342, error 2e-10 */
+    const int32_t A_12 = dcm_rk3_2_w32_near(dcm_rk3_2_w32_shr(symmetric_xy, 2) - skew_z);
+        /* Q-1.32, -0.342 .. 0.342, error 2e-10 */
+    const int32_t A_21 = dcm_rk3_2_w32_near(dcm_rk3_2_w32_shr(symmetric_xy, 2) + skew_z);
+        /* Q-1.32, -0.342 .. 0.342, error 2e-10 */
     const int64_t symmetric_yz = dcm_rk3_2_w32_mul(partner_sigma_z, sigma_y)
         + dcm_rk3_2_w32_mul(delta_y, partner_delta_z) * 2
         + dcm_rk3_2_w32_mul(partner_sigma_y, sigma_z);
         /* Q-3.66, -0.0586 .. 0.0586, error 4.7e-11 */
-    const int32_t A_23 = dcm_rk3_2_w32_fit(dcm_rk3_2_w32_shr(symmetric_yz, 2) - skew_x
-        + (INT64_C(1) << 31), 32); /* Q-1.32, -0.346 .. 0.346, error 2e-10 */
-    const int32_t A_32 = dcm_rk3_2_w32_fit(dcm_rk3_2_w32_shr(symmetric_yz, 2) + skew_x
-        + (INT64_C(1) << 31), 32); /* Q-1.32, -0.346 .. 0.346, error 2e-10 */
+    const int32_t A_23 = dcm_rk3_2_w32_near(dcm_rk3_2_w32_shr(symmetric_yz, 2) - skew_x);
+        /* Q-1.32, -0.346 .. 0.346, error 2e-10 */
+    const int32_t A_32 = dcm_rk3_2_w32_near(dcm_rk3_2_w32_shr(symmetric_yz, 2) + skew_x);
+        /* Q-1.32, -0.346 .. 0.346, error 2e-10 */
     const int64_t symmetric_zx = dcm_rk3_2_w32_mul(partner_sigma_x, sigma_z)
         + dcm_rk3_2_w32_mul(delta_z, partner_delta_x) * 2
         + dcm_rk3_2_w32_mul(partner_sigma_z, sigma_x);
         /* Q-3.66, -0.0586 .. 0.0586, error 4.7e-11 */
-    const int32_t A_31 = dcm_rk3_2_w32_fit(dcm_rk3_2_w32_shr(symmetric_zx, 2) - skew_y
-        + (INT64_C(1) << 31), 32); /* Q-1.32, -0.346 .. 0.346, error 2e-10 */
-    const int32_t A_13 = dcm_rk3_2_w32_fit(dcm_rk3_2_w32_shr(symmetric_zx, 2) + skew_y
-        + (INT64_C(1) << 31), 32); /* Q-1.32, -0.346 .. 0.346, error 2e-10 */
+    const int32_t A_31 = dcm_rk3_2_w32_near(dcm_rk3_2_w32_shr(symmetric_zx, 2) - skew_y);
+        /* Q-1.32, -0.346 .. 0.346, error 2e-10 */
+    const int32_t A_13 = dcm_rk3_2_w32_near(dcm_rk3_2_w32_shr(symmetric_zx, 2) + skew_y);
+        /* Q-1.32, -0.346 .. 0.346, error 2e-10 */
     /* direction cosine matrix, body to reference, after the step */
     const int64_t next_11_raw = (int64_t)C_11 + dcm_rk3_2_w32_shr(dcm_rk3_2_w32_mul(A_11, C_11)
         + dcm_rk3_2_w32_mul(A_21, C_12) + dcm_rk3_2_w32_mul(A_31, C_13)

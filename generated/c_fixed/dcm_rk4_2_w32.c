@@ -13,7 +13,7 @@
 /* Nonzero if the magnitude of x exceeds the limit. */
 static inline int dcm_rk4_2_w32_out(int32_t x, int32_t limit)
 {
-#if defined(__GNUC__) && (defined(__ARM_ARCH_6M__) || defined(__ARM_ARCH_8M_BASE__))
+#if defined(__GNUC__) && defined(__arm__)
     return ((uint32_t)x + (uint32_t)limit) > (2u * (uint32_t)limit); /* fewer instructions there */
 #else
     return (x < -limit) || (x > limit);
@@ -46,6 +46,18 @@ static inline int64_t dcm_rk4_2_w32_mul(int32_t a, int32_t b)
 }
 #endif
 
+/* The exact product of two words, times -1. An instruction that accumulates a product takes it
+ * with a negated factor.
+ */
+static inline int64_t dcm_rk4_2_w32_nml(int32_t a, int32_t b)
+{
+#if defined(__ARM_ARCH_ISA_THUMB) && (__ARM_ARCH_ISA_THUMB > 1)
+    return dcm_rk4_2_w32_mul(a, -b);
+#else
+    return -dcm_rk4_2_w32_mul(a, b);
+#endif
+}
+
 /* The exact square of a word. */
 static inline int64_t dcm_rk4_2_w32_sqr(int32_t a)
 {
@@ -75,6 +87,27 @@ static inline int32_t dcm_rk4_2_w32_fit(int64_t x, int n)
 #endif
 }
 
+/* x / 2^32, to the nearest, where the proof of the ranges shows that it fits into a word: the high
+ * word of x, and one more if the first bit of the low one is set.
+ */
+static inline int32_t dcm_rk4_2_w32_near(int64_t x)
+{
+#ifdef __FRAMAC__
+    const int64_t moved = x + INT64_C(2147483648);
+    return (int32_t)((moved < 0) ? ~(~moved >> 32) : (moved >> 32));
+#else
+    const uint32_t carry = (uint32_t)x >> 31;
+    const uint32_t bits = (uint32_t)((uint64_t)x >> 32) + carry;
+    return (bits <= (UINT32_MAX >> 1)) ? (int32_t)bits : (-1 - (int32_t)(UINT32_MAX - bits));
+#endif
+}
+
+/* x / 2^n of a word, rounded down. */
+static inline int32_t dcm_rk4_2_w32_asr(int32_t x, int n)
+{
+    return (x >= 0) ? (x >> n) : ~(~x >> n);
+}
+
 /* x / 2^n, rounded down, as a wide number. */
 static inline int64_t dcm_rk4_2_w32_shr(int64_t x, int n)
 {
@@ -98,7 +131,13 @@ int dcm_rk4_2_w32(const int32_t state[9], const int32_t increments[6], int32_t n
     const int32_t d2_x = increments[3];
     const int32_t d2_y = increments[4];
     const int32_t d2_z = increments[5];
-    if (dcm_rk4_2_w32_out(C_11, INT32_C(1140850688))
+    if (dcm_rk4_2_w32_out(d1_x, (INT32_C(1) << 29))
+        || dcm_rk4_2_w32_out(d1_y, (INT32_C(1) << 29))
+        || dcm_rk4_2_w32_out(d1_z, (INT32_C(1) << 29))
+        || dcm_rk4_2_w32_out(d2_x, (INT32_C(1) << 29))
+        || dcm_rk4_2_w32_out(d2_y, (INT32_C(1) << 29))
+        || dcm_rk4_2_w32_out(d2_z, (INT32_C(1) << 29))
+        || dcm_rk4_2_w32_out(C_11, INT32_C(1140850688))
         || dcm_rk4_2_w32_out(C_12, INT32_C(1140850688))
         || dcm_rk4_2_w32_out(C_13, INT32_C(1140850688))
         || dcm_rk4_2_w32_out(C_21, INT32_C(1140850688))
@@ -106,13 +145,7 @@ int dcm_rk4_2_w32(const int32_t state[9], const int32_t increments[6], int32_t n
         || dcm_rk4_2_w32_out(C_23, INT32_C(1140850688))
         || dcm_rk4_2_w32_out(C_31, INT32_C(1140850688))
         || dcm_rk4_2_w32_out(C_32, INT32_C(1140850688))
-        || dcm_rk4_2_w32_out(C_33, INT32_C(1140850688))
-        || dcm_rk4_2_w32_out(d1_x, (INT32_C(1) << 29))
-        || dcm_rk4_2_w32_out(d1_y, (INT32_C(1) << 29))
-        || dcm_rk4_2_w32_out(d1_z, (INT32_C(1) << 29))
-        || dcm_rk4_2_w32_out(d2_x, (INT32_C(1) << 29))
-        || dcm_rk4_2_w32_out(d2_y, (INT32_C(1) << 29))
-        || dcm_rk4_2_w32_out(d2_z, (INT32_C(1) << 29))) {
+        || dcm_rk4_2_w32_out(C_33, INT32_C(1140850688))) {
         return 1;
     }
     /* the angle increment of the whole step */
@@ -120,20 +153,20 @@ int dcm_rk4_2_w32(const int32_t state[9], const int32_t increments[6], int32_t n
     const int32_t sigma_y = d1_y + d2_y; /* Q-1.32, -0.25 .. 0.25, exact */
     const int32_t sigma_z = d1_z + d2_z; /* Q-1.32, -0.25 .. 0.25, exact */
     const int32_t sigma_cross_d1_x = dcm_rk4_2_w32_fit(dcm_rk4_2_w32_mul(d1_z, sigma_y)
-        - dcm_rk4_2_w32_mul(d1_y, sigma_z) + (INT32_C(1) << 28), 29);
+        + dcm_rk4_2_w32_nml(sigma_z, d1_y) + (INT32_C(1) << 28), 29);
         /* Q-4.35, -0.0313 .. 0.0313, error 1.5e-11 */
     const int32_t sigma_cross_d1_y = dcm_rk4_2_w32_fit(dcm_rk4_2_w32_mul(d1_x, sigma_z)
-        - dcm_rk4_2_w32_mul(d1_z, sigma_x) + (INT32_C(1) << 28), 29);
+        + dcm_rk4_2_w32_nml(sigma_x, d1_z) + (INT32_C(1) << 28), 29);
         /* Q-4.35, -0.0313 .. 0.0313, error 1.5e-11 */
     const int32_t sigma_cross_d1_z = dcm_rk4_2_w32_fit(dcm_rk4_2_w32_mul(d1_y, sigma_x)
-        - dcm_rk4_2_w32_mul(d1_x, sigma_y) + (INT32_C(1) << 28), 29);
+        + dcm_rk4_2_w32_nml(sigma_y, d1_x) + (INT32_C(1) << 28), 29);
         /* Q-4.35, -0.0313 .. 0.0313, error 1.5e-11 */
     const int32_t sigma_dot_sigma = dcm_rk4_2_w32_fit(dcm_rk4_2_w32_sqr(sigma_x)
         + dcm_rk4_2_w32_sqr(sigma_y) + dcm_rk4_2_w32_sqr(sigma_z) + (INT32_C(1) << 30), 31);
         /* Q-2.33, -1.17e-10 .. 0.188, error 5.9e-11 */
     /* weight of sigma in skew */
-    const int32_t skew_sigma = dcm_rk4_2_w32_fit(-dcm_rk4_2_w32_mul(sigma_dot_sigma,
-        INT32_C(1431655765) /* 1/6 in Q33 */) + (INT32_C(1) << 30), 31);
+    const int32_t skew_sigma = dcm_rk4_2_w32_fit(dcm_rk4_2_w32_mul(sigma_dot_sigma,
+        (-INT32_C(1431655765)) /* -1/6 in Q33 */) + (INT32_C(1) << 30), 31);
         /* Q-4.35, -0.0313 .. 5.83e-11, error 3.2e-11; stores skew_sigma - 1 */
     /* weight of sigma_cross_d1 in skew */
     const int32_t skew_sigma_cross_d1 = dcm_rk4_2_w32_fit(-(int64_t)skew_sigma
@@ -158,7 +191,7 @@ int dcm_rk4_2_w32(const int32_t state[9], const int32_t increments[6], int32_t n
     /* weight of sigma in partner */
     const int32_t partner_sigma = dcm_rk4_2_w32_fit((int64_t)sigma_dot_sigma
         * (INT32_C(1) << 30)
-        - dcm_rk4_2_w32_mul(d1_dot_d1, INT32_C(1431655765) /* 1/3 in Q32 */)
+        + dcm_rk4_2_w32_mul(d1_dot_d1, (-INT32_C(1431655765)) /* -1/3 in Q32 */)
         + (INT32_C(1) << 30), 31);
         /* Q-5.36, -0.0157 .. 0.00879, error 2e-11; stores partner_sigma - 1/4 */
     const int32_t d1_dot_sigma = dcm_rk4_2_w32_fit(dcm_rk4_2_w32_mul(d1_x, sigma_x)
@@ -169,92 +202,95 @@ int dcm_rk4_2_w32(const int32_t state[9], const int32_t increments[6], int32_t n
         /* Q-3.34, -0.0313 .. 0.0626, error 6.4e-11 */
     /* weight of d1 in partner */
     const int32_t partner_d1 = dcm_rk4_2_w32_fit((int64_t)shared_1 * 2
-        + dcm_rk4_2_w32_shr(-dcm_rk4_2_w32_mul(sigma_dot_sigma,
-        INT32_C(1431655765) /* 1/3 in Q32 */) + (INT32_C(1) << 29), 30), 0);
+        + dcm_rk4_2_w32_shr(dcm_rk4_2_w32_mul(sigma_dot_sigma,
+        (-INT32_C(1431655765)) /* -1/3 in Q32 */) + (INT32_C(1) << 29), 30), 0);
         /* Q-4.35, -0.0157 .. 0.0157, error 1.2e-10 */
     /* of sigma in outer products */
     const int32_t partner_x = sigma_x
-        + dcm_rk4_2_w32_fit(dcm_rk4_2_w32_mul(partner_sigma, sigma_x)
+        + dcm_rk4_2_w32_asr(dcm_rk4_2_w32_fit(dcm_rk4_2_w32_mul(partner_sigma, sigma_x)
         + dcm_rk4_2_w32_mul(d1_x, partner_d1) * 2
-        - dcm_rk4_2_w32_mul(sigma_cross_d1_x, INT32_C(1431655765) /* 1/3 in Q32 */) * 2
-        + (INT64_C(1) << 33), 34); /* Q-3.34, -0.0788 .. 0.0788, error 5.6e-11 */
+        + dcm_rk4_2_w32_mul(sigma_cross_d1_x, (-INT32_C(1431655765)) /* -1/3 in Q32 */)
+        * 2, 32) + 2, 2); /* Q-3.34, -0.0788 .. 0.0788, error 5.6e-11 */
     const int32_t partner_y = sigma_y
-        + dcm_rk4_2_w32_fit(dcm_rk4_2_w32_mul(partner_sigma, sigma_y)
+        + dcm_rk4_2_w32_asr(dcm_rk4_2_w32_fit(dcm_rk4_2_w32_mul(partner_sigma, sigma_y)
         + dcm_rk4_2_w32_mul(d1_y, partner_d1) * 2
-        - dcm_rk4_2_w32_mul(sigma_cross_d1_y, INT32_C(1431655765) /* 1/3 in Q32 */) * 2
-        + (INT64_C(1) << 33), 34); /* Q-3.34, -0.0788 .. 0.0788, error 5.6e-11 */
+        + dcm_rk4_2_w32_mul(sigma_cross_d1_y, (-INT32_C(1431655765)) /* -1/3 in Q32 */)
+        * 2, 32) + 2, 2); /* Q-3.34, -0.0788 .. 0.0788, error 5.6e-11 */
     const int32_t partner_z = sigma_z
-        + dcm_rk4_2_w32_fit(dcm_rk4_2_w32_mul(partner_sigma, sigma_z)
+        + dcm_rk4_2_w32_asr(dcm_rk4_2_w32_fit(dcm_rk4_2_w32_mul(partner_sigma, sigma_z)
         + dcm_rk4_2_w32_mul(d1_z, partner_d1) * 2
-        - dcm_rk4_2_w32_mul(sigma_cross_d1_z, INT32_C(1431655765) /* 1/3 in Q32 */) * 2
-        + (INT64_C(1) << 33), 34); /* Q-3.34, -0.0788 .. 0.0788, error 5.6e-11 */
+        + dcm_rk4_2_w32_mul(sigma_cross_d1_z, (-INT32_C(1431655765)) /* -1/3 in Q32 */)
+        * 2, 32) + 2, 2); /* Q-3.34, -0.0788 .. 0.0788, error 5.6e-11 */
     const int32_t diagonal_factor = dcm_rk4_2_w32_fit((int64_t)shared_1 * 2
         + dcm_rk4_2_w32_shr(-(int64_t)sigma_dot_sigma + 1, 1), 0);
         /* Q-4.35, -0.0254 .. 0.045, error 8.5e-11; stores diagonal_factor + 1/2 */
     /* multiple of the unit matrix */
     const int64_t diagonal = -(int64_t)sigma_dot_sigma * (INT64_C(1) << 32)
         + dcm_rk4_2_w32_shr(dcm_rk4_2_w32_mul(diagonal_factor, sigma_dot_sigma), 2)
-        + dcm_rk4_2_w32_shr(-dcm_rk4_2_w32_mul(d1_dot_sigma, shared_1), 2);
+        + dcm_rk4_2_w32_shr(dcm_rk4_2_w32_nml(shared_1, d1_dot_sigma), 2);
         /* Q-3.66, -0.105 .. 0.0114, error 5.6e-11; stores diagonal - 1 */
     /* half of u y' + y u' on the diagonal */
     const int64_t half_xx = dcm_rk4_2_w32_mul(partner_x, sigma_x);
         /* Q-3.66, -0.0197 .. 0.0197, error 1.4e-11 */
-    const int32_t A_11 = dcm_rk4_2_w32_fit(half_xx + dcm_rk4_2_w32_shr(diagonal, 1)
-        + (INT64_C(1) << 32), 33); /* Q-1.32, -0.144 .. 0.0508, error 2e-10; stores A_11 - 1 */
+    const int32_t A_11 = dcm_rk4_2_w32_asr(dcm_rk4_2_w32_fit(half_xx
+        + dcm_rk4_2_w32_shr(diagonal, 1), 32) + 1, 1);
+        /* Q-1.32, -0.144 .. 0.0508, error 2e-10; stores A_11 - 1 */
     const int64_t half_yy = dcm_rk4_2_w32_mul(partner_y, sigma_y);
         /* Q-3.66, -0.0197 .. 0.0197, error 1.4e-11 */
-    const int32_t A_22 = dcm_rk4_2_w32_fit(half_yy + dcm_rk4_2_w32_shr(diagonal, 1)
-        + (INT64_C(1) << 32), 33); /* Q-1.32, -0.144 .. 0.0508, error 2e-10; stores A_22 - 1 */
+    const int32_t A_22 = dcm_rk4_2_w32_asr(dcm_rk4_2_w32_fit(half_yy
+        + dcm_rk4_2_w32_shr(diagonal, 1), 32) + 1, 1);
+        /* Q-1.32, -0.144 .. 0.0508, error 2e-10; stores A_22 - 1 */
     const int64_t half_zz = dcm_rk4_2_w32_mul(partner_z, sigma_z);
         /* Q-3.66, -0.0197 .. 0.0197, error 1.4e-11 */
-    const int32_t A_33 = dcm_rk4_2_w32_fit(half_zz + dcm_rk4_2_w32_shr(diagonal, 1)
-        + (INT64_C(1) << 32), 33); /* Q-1.32, -0.144 .. 0.0508, error 2e-10; stores A_33 - 1 */
+    const int32_t A_33 = dcm_rk4_2_w32_asr(dcm_rk4_2_w32_fit(half_zz
+        + dcm_rk4_2_w32_shr(diagonal, 1), 32) + 1, 1);
+        /* Q-1.32, -0.144 .. 0.0508, error 2e-10; stores A_33 - 1 */
     const int64_t symmetric_xy = dcm_rk4_2_w32_mul(partner_y, sigma_x)
         + dcm_rk4_2_w32_mul(partner_x, sigma_y); /* Q-3.66, -0.0394 .. 0.0394, error 2.8e-11 */
-    const int32_t A_12 = dcm_rk4_2_w32_fit(dcm_rk4_2_w32_shr(symmetric_xy, 2) - skew_z
-        + (INT64_C(1) << 31), 32); /* Q-1.32, -0.319 .. 0.319, error 1.7e-10 */
-    const int32_t A_21 = dcm_rk4_2_w32_fit(dcm_rk4_2_w32_shr(symmetric_xy, 2) + skew_z
-        + (INT64_C(1) << 31), 32); /* Q-1.32, -0.319 .. 0.319, error 1.7e-10 */
+    const int32_t A_12 = dcm_rk4_2_w32_near(dcm_rk4_2_w32_shr(symmetric_xy, 2) - skew_z);
+        /* Q-1.32, -0.319 .. 0.319, error 1.7e-10 */
+    const int32_t A_21 = dcm_rk4_2_w32_near(dcm_rk4_2_w32_shr(symmetric_xy, 2) + skew_z);
+        /* Q-1.32, -0.319 .. 0.319, error 1.7e-10 */
     const int64_t symmetric_yz = dcm_rk4_2_w32_mul(partner_z, sigma_y)
         + dcm_rk4_2_w32_mul(partner_y, sigma_z); /* Q-3.66, -0.0394 .. 0.0394, error 2.8e-11 */
-    const int32_t A_23 = dcm_rk4_2_w32_fit(dcm_rk4_2_w32_shr(symmetric_yz, 2) - skew_x
-        + (INT64_C(1) << 31), 32); /* Q-1.32, -0.319 .. 0.319, error 1.7e-10 */
-    const int32_t A_32 = dcm_rk4_2_w32_fit(dcm_rk4_2_w32_shr(symmetric_yz, 2) + skew_x
-        + (INT64_C(1) << 31), 32); /* Q-1.32, -0.319 .. 0.319, error 1.7e-10 */
+    const int32_t A_23 = dcm_rk4_2_w32_near(dcm_rk4_2_w32_shr(symmetric_yz, 2) - skew_x);
+        /* Q-1.32, -0.319 .. 0.319, error 1.7e-10 */
+    const int32_t A_32 = dcm_rk4_2_w32_near(dcm_rk4_2_w32_shr(symmetric_yz, 2) + skew_x);
+        /* Q-1.32, -0.319 .. 0.319, error 1.7e-10 */
     const int64_t symmetric_zx = dcm_rk4_2_w32_mul(partner_x, sigma_z)
         + dcm_rk4_2_w32_mul(partner_z, sigma_x); /* Q-3.66, -0.0394 .. 0.0394, error 2.8e-11 */
-    const int32_t A_31 = dcm_rk4_2_w32_fit(dcm_rk4_2_w32_shr(symmetric_zx, 2) - skew_y
-        + (INT64_C(1) << 31), 32); /* Q-1.32, -0.319 .. 0.319, error 1.7e-10 */
-    const int32_t A_13 = dcm_rk4_2_w32_fit(dcm_rk4_2_w32_shr(symmetric_zx, 2) + skew_y
-        + (INT64_C(1) << 31), 32); /* Q-1.32, -0.319 .. 0.319, error 1.7e-10 */
+    const int32_t A_31 = dcm_rk4_2_w32_near(dcm_rk4_2_w32_shr(symmetric_zx, 2) - skew_y);
+        /* Q-1.32, -0.319 .. 0.319, error 1.7e-10 */
+    const int32_t A_13 = dcm_rk4_2_w32_near(dcm_rk4_2_w32_shr(symmetric_zx, 2) + skew_y);
+        /* Q-1.32, -0.319 .. 0.319, error 1.7e-10 */
     /* direction cosine matrix, body to reference, after the step */
-    const int32_t next_11 = C_11 + dcm_rk4_2_w32_fit(dcm_rk4_2_w32_mul(A_11, C_11)
-        + dcm_rk4_2_w32_mul(A_21, C_12) + dcm_rk4_2_w32_mul(A_31, C_13)
-        + (INT64_C(1) << 31), 32); /* Q1.30, -1.9 .. 1.9, error 1.1e-09 */
-    const int32_t next_12 = C_12 + dcm_rk4_2_w32_fit(dcm_rk4_2_w32_mul(A_12, C_11)
-        + dcm_rk4_2_w32_mul(A_22, C_12) + dcm_rk4_2_w32_mul(A_32, C_13)
-        + (INT64_C(1) << 31), 32); /* Q1.30, -1.9 .. 1.9, error 1.1e-09 */
-    const int32_t next_13 = C_13 + dcm_rk4_2_w32_fit(dcm_rk4_2_w32_mul(A_13, C_11)
-        + dcm_rk4_2_w32_mul(A_23, C_12) + dcm_rk4_2_w32_mul(A_33, C_13)
-        + (INT64_C(1) << 31), 32); /* Q1.30, -1.9 .. 1.9, error 1.1e-09 */
-    const int32_t next_21 = C_21 + dcm_rk4_2_w32_fit(dcm_rk4_2_w32_mul(A_11, C_21)
-        + dcm_rk4_2_w32_mul(A_21, C_22) + dcm_rk4_2_w32_mul(A_31, C_23)
-        + (INT64_C(1) << 31), 32); /* Q1.30, -1.9 .. 1.9, error 1.1e-09 */
-    const int32_t next_22 = C_22 + dcm_rk4_2_w32_fit(dcm_rk4_2_w32_mul(A_12, C_21)
-        + dcm_rk4_2_w32_mul(A_22, C_22) + dcm_rk4_2_w32_mul(A_32, C_23)
-        + (INT64_C(1) << 31), 32); /* Q1.30, -1.9 .. 1.9, error 1.1e-09 */
-    const int32_t next_23 = C_23 + dcm_rk4_2_w32_fit(dcm_rk4_2_w32_mul(A_13, C_21)
-        + dcm_rk4_2_w32_mul(A_23, C_22) + dcm_rk4_2_w32_mul(A_33, C_23)
-        + (INT64_C(1) << 31), 32); /* Q1.30, -1.9 .. 1.9, error 1.1e-09 */
-    const int32_t next_31 = C_31 + dcm_rk4_2_w32_fit(dcm_rk4_2_w32_mul(A_11, C_31)
-        + dcm_rk4_2_w32_mul(A_21, C_32) + dcm_rk4_2_w32_mul(A_31, C_33)
-        + (INT64_C(1) << 31), 32); /* Q1.30, -1.9 .. 1.9, error 1.1e-09 */
-    const int32_t next_32 = C_32 + dcm_rk4_2_w32_fit(dcm_rk4_2_w32_mul(A_12, C_31)
-        + dcm_rk4_2_w32_mul(A_22, C_32) + dcm_rk4_2_w32_mul(A_32, C_33)
-        + (INT64_C(1) << 31), 32); /* Q1.30, -1.9 .. 1.9, error 1.1e-09 */
-    const int32_t next_33 = C_33 + dcm_rk4_2_w32_fit(dcm_rk4_2_w32_mul(A_13, C_31)
-        + dcm_rk4_2_w32_mul(A_23, C_32) + dcm_rk4_2_w32_mul(A_33, C_33)
-        + (INT64_C(1) << 31), 32); /* Q1.30, -1.9 .. 1.9, error 1.1e-09 */
+    const int32_t next_11 = C_11 + dcm_rk4_2_w32_near(dcm_rk4_2_w32_mul(A_11, C_11)
+        + dcm_rk4_2_w32_mul(A_21, C_12) + dcm_rk4_2_w32_mul(A_31, C_13));
+        /* Q1.30, -1.9 .. 1.9, error 1.1e-09 */
+    const int32_t next_12 = C_12 + dcm_rk4_2_w32_near(dcm_rk4_2_w32_mul(A_12, C_11)
+        + dcm_rk4_2_w32_mul(A_22, C_12) + dcm_rk4_2_w32_mul(A_32, C_13));
+        /* Q1.30, -1.9 .. 1.9, error 1.1e-09 */
+    const int32_t next_13 = C_13 + dcm_rk4_2_w32_near(dcm_rk4_2_w32_mul(A_13, C_11)
+        + dcm_rk4_2_w32_mul(A_23, C_12) + dcm_rk4_2_w32_mul(A_33, C_13));
+        /* Q1.30, -1.9 .. 1.9, error 1.1e-09 */
+    const int32_t next_21 = C_21 + dcm_rk4_2_w32_near(dcm_rk4_2_w32_mul(A_11, C_21)
+        + dcm_rk4_2_w32_mul(A_21, C_22) + dcm_rk4_2_w32_mul(A_31, C_23));
+        /* Q1.30, -1.9 .. 1.9, error 1.1e-09 */
+    const int32_t next_22 = C_22 + dcm_rk4_2_w32_near(dcm_rk4_2_w32_mul(A_12, C_21)
+        + dcm_rk4_2_w32_mul(A_22, C_22) + dcm_rk4_2_w32_mul(A_32, C_23));
+        /* Q1.30, -1.9 .. 1.9, error 1.1e-09 */
+    const int32_t next_23 = C_23 + dcm_rk4_2_w32_near(dcm_rk4_2_w32_mul(A_13, C_21)
+        + dcm_rk4_2_w32_mul(A_23, C_22) + dcm_rk4_2_w32_mul(A_33, C_23));
+        /* Q1.30, -1.9 .. 1.9, error 1.1e-09 */
+    const int32_t next_31 = C_31 + dcm_rk4_2_w32_near(dcm_rk4_2_w32_mul(A_11, C_31)
+        + dcm_rk4_2_w32_mul(A_21, C_32) + dcm_rk4_2_w32_mul(A_31, C_33));
+        /* Q1.30, -1.9 .. 1.9, error 1.1e-09 */
+    const int32_t next_32 = C_32 + dcm_rk4_2_w32_near(dcm_rk4_2_w32_mul(A_12, C_31)
+        + dcm_rk4_2_w32_mul(A_22, C_32) + dcm_rk4_2_w32_mul(A_32, C_33));
+        /* Q1.30, -1.9 .. 1.9, error 1.1e-09 */
+    const int32_t next_33 = C_33 + dcm_rk4_2_w32_near(dcm_rk4_2_w32_mul(A_13, C_31)
+        + dcm_rk4_2_w32_mul(A_23, C_32) + dcm_rk4_2_w32_mul(A_33, C_33));
+        /* Q1.30, -1.9 .. 1.9, error 1.1e-09 */
     next[0] = next_11;
     next[1] = next_12;
     next[2] = next_13;

@@ -12,7 +12,7 @@
 /* Nonzero if the magnitude of x exceeds the limit. */
 static inline int dcm_update_w32_out(int32_t x, int32_t limit)
 {
-#if defined(__GNUC__) && (defined(__ARM_ARCH_6M__) || defined(__ARM_ARCH_8M_BASE__))
+#if defined(__GNUC__) && defined(__arm__)
     return ((uint32_t)x + (uint32_t)limit) > (2u * (uint32_t)limit); /* fewer instructions there */
 #else
     return (x < -limit) || (x > limit);
@@ -74,6 +74,27 @@ static inline int32_t dcm_update_w32_fit(int64_t x, int n)
 #endif
 }
 
+/* x / 2^32, to the nearest, where the proof of the ranges shows that it fits into a word: the high
+ * word of x, and one more if the first bit of the low one is set.
+ */
+static inline int32_t dcm_update_w32_near(int64_t x)
+{
+#ifdef __FRAMAC__
+    const int64_t moved = x + INT64_C(2147483648);
+    return (int32_t)((moved < 0) ? ~(~moved >> 32) : (moved >> 32));
+#else
+    const uint32_t carry = (uint32_t)x >> 31;
+    const uint32_t bits = (uint32_t)((uint64_t)x >> 32) + carry;
+    return (bits <= (UINT32_MAX >> 1)) ? (int32_t)bits : (-1 - (int32_t)(UINT32_MAX - bits));
+#endif
+}
+
+/* x / 2^n of a word, rounded down. */
+static inline int32_t dcm_update_w32_asr(int32_t x, int n)
+{
+    return (x >= 0) ? (x >> n) : ~(~x >> n);
+}
+
 /* x / 2^n, rounded down, as a wide number. */
 static inline int64_t dcm_update_w32_shr(int64_t x, int n)
 {
@@ -94,7 +115,10 @@ int dcm_update_w32(const int32_t state[9], const int32_t rotation_vector[3], int
     const int32_t phi_x = rotation_vector[0];
     const int32_t phi_y = rotation_vector[1];
     const int32_t phi_z = rotation_vector[2];
-    if (dcm_update_w32_out(C_11, INT32_C(1140850688))
+    if (dcm_update_w32_out(phi_x, (INT32_C(1) << 30))
+        || dcm_update_w32_out(phi_y, (INT32_C(1) << 30))
+        || dcm_update_w32_out(phi_z, (INT32_C(1) << 30))
+        || dcm_update_w32_out(C_11, INT32_C(1140850688))
         || dcm_update_w32_out(C_12, INT32_C(1140850688))
         || dcm_update_w32_out(C_13, INT32_C(1140850688))
         || dcm_update_w32_out(C_21, INT32_C(1140850688))
@@ -102,10 +126,7 @@ int dcm_update_w32(const int32_t state[9], const int32_t rotation_vector[3], int
         || dcm_update_w32_out(C_23, INT32_C(1140850688))
         || dcm_update_w32_out(C_31, INT32_C(1140850688))
         || dcm_update_w32_out(C_32, INT32_C(1140850688))
-        || dcm_update_w32_out(C_33, INT32_C(1140850688))
-        || dcm_update_w32_out(phi_x, (INT32_C(1) << 30))
-        || dcm_update_w32_out(phi_y, (INT32_C(1) << 30))
-        || dcm_update_w32_out(phi_z, (INT32_C(1) << 30))) {
+        || dcm_update_w32_out(C_33, INT32_C(1140850688))) {
         return 1;
     }
     const int32_t shared_1 = dcm_update_w32_fit(dcm_update_w32_sqr(phi_x)
@@ -127,25 +148,25 @@ int dcm_update_w32(const int32_t state[9], const int32_t rotation_vector[3], int
     } else {
         factor_1_taken = factor_1_under_root;
     }
-    const int32_t factor_1_series = dcm_update_w32_fit(dcm_update_w32_shr(-dcm_update_w32_mul(
-        factor_1_taken, INT32_C(56412333) /* 1/39916800 in Q51 */), 1)
-        + INT64_C(6662950945848033280) /* 1/362880 in Q60 */ + (INT64_C(1) << 31), 32);
+    const int32_t factor_1_series = dcm_update_w32_near(dcm_update_w32_shr(dcm_update_w32_mul(
+        factor_1_taken, (-INT32_C(56412333)) /* -1/39916800 in Q51 */), 1)
+        + INT64_C(6662950945848033280) /* 1/362880 in Q60 */);
         /* 2.73e-06 .. 2.76e-06, error 9e-16 */
-    const int32_t factor_1_series_2 = dcm_update_w32_fit(dcm_update_w32_shr(dcm_update_w32_mul(
+    const int32_t factor_1_series_2 = dcm_update_w32_near(dcm_update_w32_shr(dcm_update_w32_mul(
         factor_1_taken, factor_1_series), 5)
-        - INT64_C(7495819814078808064) /* 1/5040 in Q60 */ + (INT64_C(1) << 31), 32);
+        - INT64_C(7495819814078808064) /* 1/5040 in Q60 */);
         /* Q-12.43, -0.000199 .. -0.000196, error 5.8e-14 */
-    const int32_t factor_1_series_3 = dcm_update_w32_fit(dcm_update_w32_shr(dcm_update_w32_mul(
+    const int32_t factor_1_series_3 = dcm_update_w32_near(dcm_update_w32_shr(dcm_update_w32_mul(
         factor_1_taken, factor_1_series_2), 5)
-        + INT64_C(4919131752989213696) /* 1/120 in Q60 */ + (INT64_C(1) << 31), 32);
+        + INT64_C(4919131752989213696) /* 1/120 in Q60 */);
         /* 0.00818 .. 0.00834, error 3.7e-12 */
-    const int32_t factor_1_bend = dcm_update_w32_fit(dcm_update_w32_mul(factor_1_taken,
-        factor_1_series_3) + (INT64_C(1) << 33), 34);
+    const int32_t factor_1_bend = dcm_update_w32_asr(dcm_update_w32_fit(dcm_update_w32_mul(
+        factor_1_taken, factor_1_series_3), 32) + 2, 2);
         /* Q-3.34, -5.83e-11 .. 0.00626, error 3.2e-11 */
     const int32_t factor_1 = (INT32_C(1) << 30)
-        + dcm_update_w32_fit(-dcm_update_w32_mul(factor_1_taken,
-        INT32_C(1431655765) /* 1/6 in Q33 */) * 2
-        + dcm_update_w32_mul(factor_1_taken, factor_1_bend) + (INT64_C(1) << 34), 35);
+        + dcm_update_w32_asr(dcm_update_w32_fit(dcm_update_w32_mul(factor_1_taken,
+        (-INT32_C(1431655765)) /* -1/6 in Q33 */) * 2
+        + dcm_update_w32_mul(factor_1_taken, factor_1_bend), 32) + 4, 3);
         /* Q1.30, 0.874 .. 1.01, error 6.5e-10 */
     const int32_t shared_18 = dcm_update_w32_fit(dcm_update_w32_sqr(factor_1)
         + (INT32_C(1) << 29), 30); /* Q0.31, 0.382 .. 0.501, error 8.8e-10 */
@@ -165,33 +186,33 @@ int dcm_update_w32(const int32_t state[9], const int32_t rotation_vector[3], int
         shared_9_taken = angle_squared;
     }
     const int32_t shared_9_series = INT32_C(1481185360) /* 1/6227020800 in Q60 */
-        + dcm_update_w32_fit(-dcm_update_w32_mul(shared_9_taken,
-        INT32_C(1805635485) /* 1/1307674368000 in Q71 */) + (INT64_C(1) << 36), 37);
+        + dcm_update_w32_asr(dcm_update_w32_fit(dcm_update_w32_mul(shared_9_taken,
+        (-INT32_C(1805635485)) /* -1/1307674368000 in Q71 */), 32) + (INT16_C(1) << 4), 5);
         /* 1.58e-10 .. 1.61e-10, error 2.1e-19 */
-    const int32_t shared_9_series_2 = dcm_update_w32_fit(dcm_update_w32_shr(dcm_update_w32_mul(
+    const int32_t shared_9_series_2 = dcm_update_w32_near(dcm_update_w32_shr(dcm_update_w32_mul(
         shared_9_taken, shared_9_series), 4)
-        - INT64_C(7753252009628663808) /* 1/39916800 in Q60 */ + (INT64_C(1) << 31), 32);
+        - INT64_C(7753252009628663808) /* 1/39916800 in Q60 */);
         /* Q-25.56, -2.51e-08 .. -2.45e-08, error 7.9e-18 */
-    const int32_t shared_9_series_3 = dcm_update_w32_fit(dcm_update_w32_shr(dcm_update_w32_mul(
+    const int32_t shared_9_series_3 = dcm_update_w32_near(dcm_update_w32_shr(dcm_update_w32_mul(
         shared_9_taken, shared_9_series_2), 4)
-        + INT64_C(6662950945848033280) /* 1/362880 in Q60 */ + (INT64_C(1) << 31), 32);
+        + INT64_C(6662950945848033280) /* 1/362880 in Q60 */);
         /* 2.68e-06 .. 2.76e-06, error 9.2e-16 */
-    const int32_t shared_9_series_4 = dcm_update_w32_fit(dcm_update_w32_shr(dcm_update_w32_mul(
+    const int32_t shared_9_series_4 = dcm_update_w32_near(dcm_update_w32_shr(dcm_update_w32_mul(
         shared_9_taken, shared_9_series_3), 3)
-        - INT64_C(7495819814078808064) /* 1/5040 in Q60 */ + (INT64_C(1) << 31), 32);
+        - INT64_C(7495819814078808064) /* 1/5040 in Q60 */);
         /* Q-12.43, -0.000199 .. -0.00019, error 6e-14 */
-    const int32_t shared_9_series_5 = dcm_update_w32_fit(dcm_update_w32_shr(dcm_update_w32_mul(
+    const int32_t shared_9_series_5 = dcm_update_w32_near(dcm_update_w32_shr(dcm_update_w32_mul(
         shared_9_taken, shared_9_series_4), 3)
-        + INT64_C(4919131752989213696) /* 1/120 in Q60 */ + (INT64_C(1) << 31), 32);
+        + INT64_C(4919131752989213696) /* 1/120 in Q60 */);
         /* 0.00773 .. 0.00834, error 3.9e-12 */
     const int32_t shared_9_bend = dcm_update_w32_fit(dcm_update_w32_mul(shared_9_taken,
         shared_9_series_5) + (INT32_C(1) << 29), 30);
         /* Q-5.36, -2.92e-11 .. 0.0251, error 1.9e-11 */
     const int32_t shared_9 = (INT32_C(1) << 30)
-        + dcm_update_w32_fit(-dcm_update_w32_mul(shared_9_taken,
-        INT32_C(1431655765) /* 1/6 in Q33 */) * 2
-        + dcm_update_w32_shr(dcm_update_w32_mul(shared_9_taken, shared_9_bend), 2)
-        + (INT64_C(1) << 32), 33); /* Q1.30, 0.499 .. 1.01, error 1.1e-09 */
+        + dcm_update_w32_asr(dcm_update_w32_fit(dcm_update_w32_mul(shared_9_taken,
+        (-INT32_C(1431655765)) /* -1/6 in Q33 */) * 2
+        + dcm_update_w32_shr(dcm_update_w32_mul(shared_9_taken, shared_9_bend), 2), 32)
+        + 1, 1); /* Q1.30, 0.499 .. 1.01, error 1.1e-09 */
     const int64_t shared_10 = dcm_update_w32_mul(phi_z, shared_9);
         /* Q3.60, -1.01 .. 1.01, error 1.1e-09 */
     const int32_t shared_11 = dcm_update_w32_fit(dcm_update_w32_mul(phi_x, shared_18)

@@ -12,7 +12,7 @@
 /* Nonzero if the magnitude of x exceeds the limit. */
 static inline int dcm_velocity_2_w32_out(int32_t x, int32_t limit)
 {
-#if defined(__GNUC__) && (defined(__ARM_ARCH_6M__) || defined(__ARM_ARCH_8M_BASE__))
+#if defined(__GNUC__) && defined(__arm__)
     return ((uint32_t)x + (uint32_t)limit) > (2u * (uint32_t)limit); /* fewer instructions there */
 #else
     return (x < -limit) || (x > limit);
@@ -45,6 +45,18 @@ static inline int64_t dcm_velocity_2_w32_mul(int32_t a, int32_t b)
 }
 #endif
 
+/* The exact product of two words, times -1. An instruction that accumulates a product takes it
+ * with a negated factor.
+ */
+static inline int64_t dcm_velocity_2_w32_nml(int32_t a, int32_t b)
+{
+#if defined(__ARM_ARCH_ISA_THUMB) && (__ARM_ARCH_ISA_THUMB > 1)
+    return dcm_velocity_2_w32_mul(a, -b);
+#else
+    return -dcm_velocity_2_w32_mul(a, b);
+#endif
+}
+
 /* x / 2^n, rounded down, where the proof of the ranges shows that it fits into a word: then the
  * 32 bits of x from bit n on, read as a number with a sign, are that quotient. For n above 32 the
  * high word of x is shifted on. Nothing is left to the compiler: no right shift of a negative
@@ -61,6 +73,21 @@ static inline int32_t dcm_velocity_2_w32_fit(int64_t x, int n)
     const int32_t high = (bits <= (UINT32_MAX >> 1)) ? (int32_t)bits
                                                  : (-1 - (int32_t)(UINT32_MAX - bits));
     return (high < 0) ? ~(~high >> beyond) : (high >> beyond);
+#endif
+}
+
+/* x / 2^32, to the nearest, where the proof of the ranges shows that it fits into a word: the high
+ * word of x, and one more if the first bit of the low one is set.
+ */
+static inline int32_t dcm_velocity_2_w32_near(int64_t x)
+{
+#ifdef __FRAMAC__
+    const int64_t moved = x + INT64_C(2147483648);
+    return (int32_t)((moved < 0) ? ~(~moved >> 32) : (moved >> 32));
+#else
+    const uint32_t carry = (uint32_t)x >> 31;
+    const uint32_t bits = (uint32_t)((uint64_t)x >> 32) + carry;
+    return (bits <= (UINT32_MAX >> 1)) ? (int32_t)bits : (-1 - (int32_t)(UINT32_MAX - bits));
 #endif
 }
 
@@ -85,7 +112,16 @@ int dcm_velocity_2_w32(const int32_t state[9], const int32_t velocity_sum[3],
     const int32_t beta_x = angle_sum[0];
     const int32_t beta_y = angle_sum[1];
     const int32_t beta_z = angle_sum[2];
-    if (dcm_velocity_2_w32_out(C_11, INT32_C(1140850688))
+    if (dcm_velocity_2_w32_out(beta_x, (INT32_C(1) << 30))
+        || dcm_velocity_2_w32_out(beta_y, (INT32_C(1) << 30))
+        || dcm_velocity_2_w32_out(beta_z, (INT32_C(1) << 30))
+        || dcm_velocity_2_w32_out(eta_x, (INT32_C(1) << 30))
+        || dcm_velocity_2_w32_out(eta_y, (INT32_C(1) << 30))
+        || dcm_velocity_2_w32_out(eta_z, (INT32_C(1) << 30))
+        || dcm_velocity_2_w32_out(u_x, (INT32_C(1) << 30))
+        || dcm_velocity_2_w32_out(u_y, (INT32_C(1) << 30))
+        || dcm_velocity_2_w32_out(u_z, (INT32_C(1) << 30))
+        || dcm_velocity_2_w32_out(C_11, INT32_C(1140850688))
         || dcm_velocity_2_w32_out(C_12, INT32_C(1140850688))
         || dcm_velocity_2_w32_out(C_13, INT32_C(1140850688))
         || dcm_velocity_2_w32_out(C_21, INT32_C(1140850688))
@@ -93,33 +129,21 @@ int dcm_velocity_2_w32(const int32_t state[9], const int32_t velocity_sum[3],
         || dcm_velocity_2_w32_out(C_23, INT32_C(1140850688))
         || dcm_velocity_2_w32_out(C_31, INT32_C(1140850688))
         || dcm_velocity_2_w32_out(C_32, INT32_C(1140850688))
-        || dcm_velocity_2_w32_out(C_33, INT32_C(1140850688))
-        || dcm_velocity_2_w32_out(u_x, (INT32_C(1) << 30))
-        || dcm_velocity_2_w32_out(u_y, (INT32_C(1) << 30))
-        || dcm_velocity_2_w32_out(u_z, (INT32_C(1) << 30))
-        || dcm_velocity_2_w32_out(eta_x, (INT32_C(1) << 30))
-        || dcm_velocity_2_w32_out(eta_y, (INT32_C(1) << 30))
-        || dcm_velocity_2_w32_out(eta_z, (INT32_C(1) << 30))
-        || dcm_velocity_2_w32_out(beta_x, (INT32_C(1) << 30))
-        || dcm_velocity_2_w32_out(beta_y, (INT32_C(1) << 30))
-        || dcm_velocity_2_w32_out(beta_z, (INT32_C(1) << 30))) {
+        || dcm_velocity_2_w32_out(C_33, INT32_C(1140850688))) {
         return 1;
     }
     const int32_t shared_1 = u_z; /* Q3.28, -4 .. 4, exact */
     const int32_t shared_2 = beta_z; /* Q0.31, -0.5 .. 0.5, exact */
     /* velocity increment, body axes at the start of the slow cycle */
-    const int32_t w_x = dcm_velocity_2_w32_fit((int64_t)eta_x * (INT32_C(1) << 30)
+    const int32_t w_x = dcm_velocity_2_w32_near((int64_t)eta_x * (INT32_C(1) << 30)
         + (int64_t)u_x * (INT64_C(1) << 31) + dcm_velocity_2_w32_mul(beta_y, shared_1)
-        - dcm_velocity_2_w32_mul(shared_2, u_y) + (INT64_C(1) << 31), 32);
-        /* Q5.26, -20.1 .. 20.1, error 7.5e-09 */
-    const int32_t w_y = dcm_velocity_2_w32_fit((int64_t)eta_y * (INT32_C(1) << 30)
-        + (int64_t)u_y * (INT64_C(1) << 31) - dcm_velocity_2_w32_mul(beta_x, shared_1)
-        + dcm_velocity_2_w32_mul(shared_2, u_x) + (INT64_C(1) << 31), 32);
-        /* Q5.26, -20.1 .. 20.1, error 7.5e-09 */
-    const int32_t w_z = dcm_velocity_2_w32_fit((int64_t)eta_z * (INT32_C(1) << 30)
+        + dcm_velocity_2_w32_nml(u_y, shared_2)); /* Q5.26, -20.1 .. 20.1, error 7.5e-09 */
+    const int32_t w_y = dcm_velocity_2_w32_near((int64_t)eta_y * (INT32_C(1) << 30)
+        + (int64_t)u_y * (INT64_C(1) << 31) + dcm_velocity_2_w32_nml(shared_1, beta_x)
+        + dcm_velocity_2_w32_mul(shared_2, u_x)); /* Q5.26, -20.1 .. 20.1, error 7.5e-09 */
+    const int32_t w_z = dcm_velocity_2_w32_near((int64_t)eta_z * (INT32_C(1) << 30)
         + (int64_t)u_z * (INT64_C(1) << 31) + dcm_velocity_2_w32_mul(beta_x, u_y)
-        - dcm_velocity_2_w32_mul(beta_y, u_x) + (INT64_C(1) << 31), 32);
-        /* Q5.26, -20.1 .. 20.1, error 7.5e-09 */
+        + dcm_velocity_2_w32_nml(u_x, beta_y)); /* Q5.26, -20.1 .. 20.1, error 7.5e-09 */
     /* velocity increment of the slow cycle, navigation axes */
     const int32_t v_x = dcm_velocity_2_w32_fit(dcm_velocity_2_w32_mul(C_11, w_x)
         + dcm_velocity_2_w32_mul(C_12, w_y) + dcm_velocity_2_w32_mul(C_13, w_z)

@@ -12,7 +12,7 @@
 /* Nonzero if the magnitude of x exceeds the limit. */
 static inline int error_matrix_w32_out(int32_t x, int32_t limit)
 {
-#if defined(__GNUC__) && (defined(__ARM_ARCH_6M__) || defined(__ARM_ARCH_8M_BASE__))
+#if defined(__GNUC__) && defined(__arm__)
     return ((uint32_t)x + (uint32_t)limit) > (2u * (uint32_t)limit); /* fewer instructions there */
 #else
     return (x < -limit) || (x > limit);
@@ -64,6 +64,21 @@ static inline int32_t error_matrix_w32_fit(int64_t x, int n)
 #endif
 }
 
+/* x / 2^32, to the nearest, where the proof of the ranges shows that it fits into a word: the high
+ * word of x, and one more if the first bit of the low one is set.
+ */
+static inline int32_t error_matrix_w32_near(int64_t x)
+{
+#ifdef __FRAMAC__
+    const int64_t moved = x + INT64_C(2147483648);
+    return (int32_t)((moved < 0) ? ~(~moved >> 32) : (moved >> 32));
+#else
+    const uint32_t carry = (uint32_t)x >> 31;
+    const uint32_t bits = (uint32_t)((uint64_t)x >> 32) + carry;
+    return (bits <= (UINT32_MAX >> 1)) ? (int32_t)bits : (-1 - (int32_t)(UINT32_MAX - bits));
+#endif
+}
+
 int error_matrix_w32(const int32_t computed[9], const int32_t truth[9], int32_t error[9],
     int32_t scale[3], int32_t skew[3], int32_t drift[3])
 {
@@ -85,16 +100,7 @@ int error_matrix_w32(const int32_t computed[9], const int32_t truth[9], int32_t 
     const int32_t T_31 = truth[6];
     const int32_t T_32 = truth[7];
     const int32_t T_33 = truth[8];
-    if (error_matrix_w32_out(C_11, INT32_C(1140850688))
-        || error_matrix_w32_out(C_12, INT32_C(1140850688))
-        || error_matrix_w32_out(C_13, INT32_C(1140850688))
-        || error_matrix_w32_out(C_21, INT32_C(1140850688))
-        || error_matrix_w32_out(C_22, INT32_C(1140850688))
-        || error_matrix_w32_out(C_23, INT32_C(1140850688))
-        || error_matrix_w32_out(C_31, INT32_C(1140850688))
-        || error_matrix_w32_out(C_32, INT32_C(1140850688))
-        || error_matrix_w32_out(C_33, INT32_C(1140850688))
-        || error_matrix_w32_out(T_11, INT32_C(1140850688))
+    if (error_matrix_w32_out(T_11, INT32_C(1140850688))
         || error_matrix_w32_out(T_12, INT32_C(1140850688))
         || error_matrix_w32_out(T_13, INT32_C(1140850688))
         || error_matrix_w32_out(T_21, INT32_C(1140850688))
@@ -102,40 +108,49 @@ int error_matrix_w32(const int32_t computed[9], const int32_t truth[9], int32_t 
         || error_matrix_w32_out(T_23, INT32_C(1140850688))
         || error_matrix_w32_out(T_31, INT32_C(1140850688))
         || error_matrix_w32_out(T_32, INT32_C(1140850688))
-        || error_matrix_w32_out(T_33, INT32_C(1140850688))) {
+        || error_matrix_w32_out(T_33, INT32_C(1140850688))
+        || error_matrix_w32_out(C_11, INT32_C(1140850688))
+        || error_matrix_w32_out(C_12, INT32_C(1140850688))
+        || error_matrix_w32_out(C_13, INT32_C(1140850688))
+        || error_matrix_w32_out(C_21, INT32_C(1140850688))
+        || error_matrix_w32_out(C_22, INT32_C(1140850688))
+        || error_matrix_w32_out(C_23, INT32_C(1140850688))
+        || error_matrix_w32_out(C_31, INT32_C(1140850688))
+        || error_matrix_w32_out(C_32, INT32_C(1140850688))
+        || error_matrix_w32_out(C_33, INT32_C(1140850688))) {
         return 1;
     }
     /* error matrix, reference axes */
     const int32_t E_11 = -(INT32_C(1) << 28)
-        + error_matrix_w32_fit(error_matrix_w32_mul(C_11, T_11)
-        + error_matrix_w32_mul(C_12, T_12) + error_matrix_w32_mul(C_13, T_13)
-        + (INT64_C(1) << 31), 32); /* Q3.28, -4.39 .. 2.39, error 1.9e-09 */
-    const int32_t E_12 = error_matrix_w32_fit(error_matrix_w32_mul(C_11, T_21)
-        + error_matrix_w32_mul(C_12, T_22) + error_matrix_w32_mul(C_13, T_23)
-        + (INT64_C(1) << 31), 32); /* Q3.28, -3.39 .. 3.39, error 1.9e-09 */
-    const int32_t E_13 = error_matrix_w32_fit(error_matrix_w32_mul(C_11, T_31)
-        + error_matrix_w32_mul(C_12, T_32) + error_matrix_w32_mul(C_13, T_33)
-        + (INT64_C(1) << 31), 32); /* Q3.28, -3.39 .. 3.39, error 1.9e-09 */
-    const int32_t E_21 = error_matrix_w32_fit(error_matrix_w32_mul(C_21, T_11)
-        + error_matrix_w32_mul(C_22, T_12) + error_matrix_w32_mul(C_23, T_13)
-        + (INT64_C(1) << 31), 32); /* Q3.28, -3.39 .. 3.39, error 1.9e-09 */
+        + error_matrix_w32_near(error_matrix_w32_mul(C_11, T_11)
+        + error_matrix_w32_mul(C_12, T_12) + error_matrix_w32_mul(C_13, T_13));
+        /* Q3.28, -4.39 .. 2.39, error 1.9e-09 */
+    const int32_t E_12 = error_matrix_w32_near(error_matrix_w32_mul(C_11, T_21)
+        + error_matrix_w32_mul(C_12, T_22) + error_matrix_w32_mul(C_13, T_23));
+        /* Q3.28, -3.39 .. 3.39, error 1.9e-09 */
+    const int32_t E_13 = error_matrix_w32_near(error_matrix_w32_mul(C_11, T_31)
+        + error_matrix_w32_mul(C_12, T_32) + error_matrix_w32_mul(C_13, T_33));
+        /* Q3.28, -3.39 .. 3.39, error 1.9e-09 */
+    const int32_t E_21 = error_matrix_w32_near(error_matrix_w32_mul(C_21, T_11)
+        + error_matrix_w32_mul(C_22, T_12) + error_matrix_w32_mul(C_23, T_13));
+        /* Q3.28, -3.39 .. 3.39, error 1.9e-09 */
     const int32_t E_22 = -(INT32_C(1) << 28)
-        + error_matrix_w32_fit(error_matrix_w32_mul(C_21, T_21)
-        + error_matrix_w32_mul(C_22, T_22) + error_matrix_w32_mul(C_23, T_23)
-        + (INT64_C(1) << 31), 32); /* Q3.28, -4.39 .. 2.39, error 1.9e-09 */
-    const int32_t E_23 = error_matrix_w32_fit(error_matrix_w32_mul(C_21, T_31)
-        + error_matrix_w32_mul(C_22, T_32) + error_matrix_w32_mul(C_23, T_33)
-        + (INT64_C(1) << 31), 32); /* Q3.28, -3.39 .. 3.39, error 1.9e-09 */
-    const int32_t E_31 = error_matrix_w32_fit(error_matrix_w32_mul(C_31, T_11)
-        + error_matrix_w32_mul(C_32, T_12) + error_matrix_w32_mul(C_33, T_13)
-        + (INT64_C(1) << 31), 32); /* Q3.28, -3.39 .. 3.39, error 1.9e-09 */
-    const int32_t E_32 = error_matrix_w32_fit(error_matrix_w32_mul(C_31, T_21)
-        + error_matrix_w32_mul(C_32, T_22) + error_matrix_w32_mul(C_33, T_23)
-        + (INT64_C(1) << 31), 32); /* Q3.28, -3.39 .. 3.39, error 1.9e-09 */
+        + error_matrix_w32_near(error_matrix_w32_mul(C_21, T_21)
+        + error_matrix_w32_mul(C_22, T_22) + error_matrix_w32_mul(C_23, T_23));
+        /* Q3.28, -4.39 .. 2.39, error 1.9e-09 */
+    const int32_t E_23 = error_matrix_w32_near(error_matrix_w32_mul(C_21, T_31)
+        + error_matrix_w32_mul(C_22, T_32) + error_matrix_w32_mul(C_23, T_33));
+        /* Q3.28, -3.39 .. 3.39, error 1.9e-09 */
+    const int32_t E_31 = error_matrix_w32_near(error_matrix_w32_mul(C_31, T_11)
+        + error_matrix_w32_mul(C_32, T_12) + error_matrix_w32_mul(C_33, T_13));
+        /* Q3.28, -3.39 .. 3.39, error 1.9e-09 */
+    const int32_t E_32 = error_matrix_w32_near(error_matrix_w32_mul(C_31, T_21)
+        + error_matrix_w32_mul(C_32, T_22) + error_matrix_w32_mul(C_33, T_23));
+        /* Q3.28, -3.39 .. 3.39, error 1.9e-09 */
     const int32_t E_33 = -(INT32_C(1) << 28)
-        + error_matrix_w32_fit(error_matrix_w32_mul(C_31, T_31)
-        + error_matrix_w32_mul(C_32, T_32) + error_matrix_w32_mul(C_33, T_33)
-        + (INT64_C(1) << 31), 32); /* Q3.28, -4.39 .. 2.39, error 1.9e-09 */
+        + error_matrix_w32_near(error_matrix_w32_mul(C_31, T_31)
+        + error_matrix_w32_mul(C_32, T_32) + error_matrix_w32_mul(C_33, T_33));
+        /* Q3.28, -4.39 .. 2.39, error 1.9e-09 */
     const int64_t shared_1 = (int64_t)E_23; /* Q34.29, -1.7 .. 1.7, error 9.4e-10 */
     const int64_t shared_2 = (int64_t)E_32; /* Q34.29, -1.7 .. 1.7, error 9.4e-10 */
     /* skew errors, reference axes */

@@ -12,7 +12,7 @@
 /* Nonzero if the magnitude of x exceeds the limit. */
 static inline int euler_angles_from_dcm_w32_out(int32_t x, int32_t limit)
 {
-#if defined(__GNUC__) && (defined(__ARM_ARCH_6M__) || defined(__ARM_ARCH_8M_BASE__))
+#if defined(__GNUC__) && defined(__arm__)
     return ((uint32_t)x + (uint32_t)limit) > (2u * (uint32_t)limit); /* fewer instructions there */
 #else
     return (x < -limit) || (x > limit);
@@ -74,6 +74,27 @@ static inline int32_t euler_angles_from_dcm_w32_fit(int64_t x, int n)
 #endif
 }
 
+/* x / 2^32, to the nearest, where the proof of the ranges shows that it fits into a word: the high
+ * word of x, and one more if the first bit of the low one is set.
+ */
+static inline int32_t euler_angles_from_dcm_w32_near(int64_t x)
+{
+#ifdef __FRAMAC__
+    const int64_t moved = x + INT64_C(2147483648);
+    return (int32_t)((moved < 0) ? ~(~moved >> 32) : (moved >> 32));
+#else
+    const uint32_t carry = (uint32_t)x >> 31;
+    const uint32_t bits = (uint32_t)((uint64_t)x >> 32) + carry;
+    return (bits <= (UINT32_MAX >> 1)) ? (int32_t)bits : (-1 - (int32_t)(UINT32_MAX - bits));
+#endif
+}
+
+/* x / 2^n of a word, rounded down. */
+static inline int32_t euler_angles_from_dcm_w32_asr(int32_t x, int n)
+{
+    return (x >= 0) ? (x >> n) : ~(~x >> n);
+}
+
 /* x / 2^n, rounded down, as a wide number. */
 static inline int64_t euler_angles_from_dcm_w32_shr(int64_t x, int n)
 {
@@ -122,7 +143,10 @@ int euler_angles_from_dcm_w32(const int32_t state[9], const int32_t previous[3],
     const int32_t C_32 = state[7];
     const int32_t C_33 = state[8];
     const int32_t last_roll = previous[0];
-    if (euler_angles_from_dcm_w32_out(C_11, INT32_C(1140850688))
+    if (euler_angles_from_dcm_w32_out(last_roll, INT32_C(1686629857))
+        || euler_angles_from_dcm_w32_out(previous[1], INT32_C(1686629857))
+        || euler_angles_from_dcm_w32_out(previous[2], INT32_C(1686629857))
+        || euler_angles_from_dcm_w32_out(C_11, INT32_C(1140850688))
         || euler_angles_from_dcm_w32_out(C_12, INT32_C(1140850688))
         || euler_angles_from_dcm_w32_out(C_13, INT32_C(1140850688))
         || euler_angles_from_dcm_w32_out(C_21, INT32_C(1140850688))
@@ -130,10 +154,7 @@ int euler_angles_from_dcm_w32(const int32_t state[9], const int32_t previous[3],
         || euler_angles_from_dcm_w32_out(C_23, INT32_C(1140850688))
         || euler_angles_from_dcm_w32_out(C_31, INT32_C(1140850688))
         || euler_angles_from_dcm_w32_out(C_32, INT32_C(1140850688))
-        || euler_angles_from_dcm_w32_out(C_33, INT32_C(1140850688))
-        || euler_angles_from_dcm_w32_out(last_roll, INT32_C(1686629857))
-        || euler_angles_from_dcm_w32_out(previous[1], INT32_C(1686629857))
-        || euler_angles_from_dcm_w32_out(previous[2], INT32_C(1686629857))) {
+        || euler_angles_from_dcm_w32_out(C_33, INT32_C(1140850688))) {
         return 1;
     }
     /* square of the cosine of pitch */
@@ -200,68 +221,63 @@ int euler_angles_from_dcm_w32(const int32_t state[9], const int32_t previous[3],
         euler_angles_from_dcm_w32_div((int64_t)next_pitch_numerator
         * (INT64_C(1) << 32), next_pitch_denominator), 0);
         /* Q-1.32, -0.392 .. 0.438, error 1.2e-10 */
-    const int32_t next_pitch_square = euler_angles_from_dcm_w32_fit(
-        euler_angles_from_dcm_w32_sqr(next_pitch_tangent) + (INT32_C(1) << 30), 31);
-        /* Q-2.33, -2.33e-10 .. 0.192, error 1.7e-10 */
-    const int32_t next_pitch_series = euler_angles_from_dcm_w32_fit(
+    const int32_t next_pitch_square = euler_angles_from_dcm_w32_near(
+        euler_angles_from_dcm_w32_sqr(next_pitch_tangent));
+        /* Q-1.32, -2.33e-10 .. 0.192, error 2.2e-10 */
+    const int32_t next_pitch_series = -INT32_C(1412277185) /* 0.08220535148788144 in Q34 */
+        + euler_angles_from_dcm_w32_fit(euler_angles_from_dcm_w32_mul(next_pitch_square,
+        INT32_C(735255871) /* 0.042797524437051732 in Q34 */), 32);
+        /* Q-3.34, -0.0823 .. -0.074, error 8.3e-11 */
+    const int32_t next_pitch_series_2 = euler_angles_from_dcm_w32_fit(INT32_C(
+        1888188099) /* 0.10990701262248558 in Q34 */
+        + euler_angles_from_dcm_w32_shr(euler_angles_from_dcm_w32_mul(next_pitch_square,
+        next_pitch_series), 32), 0); /* 0.0941 .. 0.11, error 1.1e-10 */
+    const int32_t next_pitch_series_3 = euler_angles_from_dcm_w32_near(
         euler_angles_from_dcm_w32_shr(euler_angles_from_dcm_w32_mul(next_pitch_square,
-        INT32_C(735255871) /* 0.042797524437051732 in Q34 */), 1)
-        - INT64_C(6065684321545150080) /* 0.08220535148788144 in Q60 */
-        + (INT64_C(1) << 31), 32); /* Q-3.34, -0.0823 .. -0.074, error 3.9e-11 */
-    const int32_t next_pitch_series_2 = euler_angles_from_dcm_w32_fit(
+        next_pitch_series_2), 1)
+        - INT64_C(5267120771796303872) /* 0.14276559461088406 in Q34 */);
+        /* Q-2.33, -0.143 .. -0.121, error 1.3e-10 */
+    const int32_t next_pitch_series_4 = INT32_C(1717955826) /* 0.19999638041759513 in Q33 */
+        + euler_angles_from_dcm_w32_near(euler_angles_from_dcm_w32_mul(next_pitch_square,
+        next_pitch_series_3)); /* 0.172 .. 0.2, error 1.7e-10 */
+    const int32_t next_pitch_series_5 = euler_angles_from_dcm_w32_near(
         euler_angles_from_dcm_w32_shr(euler_angles_from_dcm_w32_mul(next_pitch_square,
-        next_pitch_series), 2)
-        + INT64_C(4054853067505913472) /* 0.10990701262248558 in Q60 */
-        + (INT32_C(1) << 30), 31); /* 0.0941 .. 0.11, error 5e-11 */
-    const int32_t next_pitch_series_3 = euler_angles_from_dcm_w32_fit(
-        euler_angles_from_dcm_w32_shr(euler_angles_from_dcm_w32_mul(next_pitch_square,
-        next_pitch_series_2), 2)
-        - INT64_C(5267120772635892064) /* 0.14276559461088406 in Q60 */
-        + (INT64_C(1) << 31), 32); /* Q-2.33, -0.143 .. -0.121, error 8.6e-11 */
-    const int32_t next_pitch_series_4 = euler_angles_from_dcm_w32_fit(
-        euler_angles_from_dcm_w32_shr(euler_angles_from_dcm_w32_mul(next_pitch_square,
-        next_pitch_series_3), 1)
-        + INT64_C(7378564090463267680) /* 0.19999638041759513 in Q60 */
-        + (INT64_C(1) << 31), 32); /* 0.172 .. 0.2, error 9.8e-11 */
-    const int32_t next_pitch_series_5 = euler_angles_from_dcm_w32_fit(
-        euler_angles_from_dcm_w32_shr(euler_angles_from_dcm_w32_mul(next_pitch_square,
-        next_pitch_series_4), 2)
-        - INT64_C(6148913518682917232) /* 0.33333326976907529 in Q60 */
-        + (INT64_C(1) << 31), 32); /* Q-1.32, -0.334 .. -0.295, error 1.7e-10 */
-    const int32_t next_pitch_bend = euler_angles_from_dcm_w32_fit(euler_angles_from_dcm_w32_mul(
-        next_pitch_square, next_pitch_series_5)
-        - INT64_C(11967952160) /* 3.2439199325215087e-10 in Q60 */
-        + (INT32_C(1) << 30), 31); /* Q-3.34, -0.0639 .. -1.74e-10, error 1.2e-10 */
-    const int64_t next_pitch_arctangent = (int64_t)next_pitch_tangent * (INT64_C(1) << 32)
-        + euler_angles_from_dcm_w32_shr(euler_angles_from_dcm_w32_mul(next_pitch_tangent,
-        next_pitch_bend), 2); /* Q-1.64, -0.392 .. 0.438, error 1.9e-10 */
+        next_pitch_series_4), 1)
+        - INT64_C(6148913519426273280) /* 0.33333326976907529 in Q33 */);
+        /* Q-1.32, -0.334 .. -0.295, error 2.4e-10 */
+    const int32_t next_pitch_bend = -1 /* 3.2439199325215087e-10 in Q32 */
+        + euler_angles_from_dcm_w32_near(euler_angles_from_dcm_w32_mul(next_pitch_square,
+        next_pitch_series_5)); /* Q-1.32, -0.0639 .. 2.33e-10, error 3.3e-10 */
+    const int64_t next_pitch_arctangent = euler_angles_from_dcm_w32_mul(next_pitch_tangent,
+        next_pitch_bend) + (int64_t)next_pitch_tangent * (INT64_C(1) << 32);
+        /* Q-1.64, -0.392 .. 0.438, error 2.8e-10 */
     const int64_t next_pitch_angle = euler_angles_from_dcm_w32_shr(next_pitch_arctangent, 2)
-        + INT64_C(3622009729038561420); /* Q1.62, 0.394 .. 1.23, error 1.9e-10 */
-    int64_t next_pitch_octant; /* Q1.62, -1.84e-10 .. 0.786, error 1.9e-10 */
+        + INT64_C(3622009729038561421); /* Q1.62, 0.394 .. 1.23, error 2.8e-10 */
+    int64_t next_pitch_octant; /* Q1.62, -2.76e-10 .. 0.786, error 2.8e-10 */
     if (next_pitch_beyond >= 0) {
         next_pitch_octant = next_pitch_angle;
     } else {
         next_pitch_octant = euler_angles_from_dcm_w32_shr(next_pitch_arctangent, 2);
     }
     const int64_t next_pitch_angle_2 = euler_angles_from_dcm_w32_shr(-next_pitch_octant, 1)
-        + INT64_C(3622009729038561420); /* Q2.61, 0.785 .. 1.58, error 1.9e-10 */
-    int64_t next_pitch_quadrant; /* Q1.62, -1.84e-10 .. 1.58, error 1.9e-10 */
+        + INT64_C(3622009729038561421); /* Q2.61, 0.785 .. 1.58, error 2.8e-10 */
+    int64_t next_pitch_quadrant; /* Q1.62, -2.76e-10 .. 1.58, error 2.8e-10 */
     if ((int64_t)next_pitch_taken_2 * 2 >= (int64_t)next_pitch_height) {
         next_pitch_quadrant = next_pitch_octant;
     } else {
         next_pitch_quadrant = next_pitch_angle_2 * 2;
     }
     const int64_t next_pitch_angle_3 = -next_pitch_quadrant;
-        /* Q1.62, -1.58 .. 1.84e-10, error 1.9e-10 */
-    int64_t next_pitch_side; /* Q1.62, -1.58 .. 1.58, error 1.9e-10 */
+        /* Q1.62, -1.58 .. 2.76e-10, error 2.8e-10 */
+    int64_t next_pitch_side; /* Q1.62, -1.58 .. 1.58, error 2.8e-10 */
     if ((int64_t)next_pitch_taken >= 0) {
         next_pitch_side = next_pitch_quadrant;
     } else {
         next_pitch_side = next_pitch_angle_3;
     }
     /* pitch */
-    const int32_t next_pitch = euler_angles_from_dcm_w32_fit(next_pitch_side
-        + (INT64_C(1) << 32), 33); /* Q2.29, -1.58 .. 1.58, error 5.6e-09 */
+    const int32_t next_pitch = euler_angles_from_dcm_w32_asr(euler_angles_from_dcm_w32_fit(
+        next_pitch_side, 32) + 1, 1); /* Q2.29, -1.58 .. 1.58, error 5.7e-09 */
     const int64_t next_roll_case_angle_neg = -(int64_t)C_32; /* Q33.30, -1.07 .. 1.07, exact */
     int32_t next_roll_case_angle_height = C_32; /* Q1.30, 0 .. 1.07, exact */
     if (next_roll_case_angle_neg > next_roll_case_angle_height) {
@@ -312,79 +328,79 @@ int euler_angles_from_dcm_w32(const int32_t state[9], const int32_t previous[3],
     const int32_t next_roll_case_angle_square = euler_angles_from_dcm_w32_fit(
         euler_angles_from_dcm_w32_sqr(next_roll_case_angle_tangent)
         + (INT32_C(1) << 30), 31); /* Q-2.33, -2.33e-10 .. 0.192, error 1.7e-10 */
-    const int32_t next_roll_case_angle_series = euler_angles_from_dcm_w32_fit(
-        euler_angles_from_dcm_w32_shr(euler_angles_from_dcm_w32_mul(
-        next_roll_case_angle_square, INT32_C(735255871) /* 0.042797524437051732 in Q34 */),
-        1) - INT64_C(6065684321545150080) /* 0.08220535148788144 in Q60 */
-        + (INT64_C(1) << 31), 32); /* Q-3.34, -0.0823 .. -0.074, error 3.9e-11 */
+    const int32_t next_roll_case_angle_series = -INT32_C(
+        1412277185) /* 0.08220535148788144 in Q34 */ + euler_angles_from_dcm_w32_fit(
+        euler_angles_from_dcm_w32_mul(next_roll_case_angle_square,
+        INT32_C(367627936) /* 0.042797524437051732 in Q33 */), 32);
+        /* Q-3.34, -0.0823 .. -0.074, error 8.7e-11 */
     const int32_t next_roll_case_angle_ser_2 = euler_angles_from_dcm_w32_fit(
         euler_angles_from_dcm_w32_shr(euler_angles_from_dcm_w32_mul(
         next_roll_case_angle_square, next_roll_case_angle_series), 2)
-        + INT64_C(4054853067505913472) /* 0.10990701262248558 in Q60 */
-        + (INT32_C(1) << 30), 31); /* 0.0941 .. 0.11, error 5e-11 */
-    const int32_t next_roll_case_angle_ser_3 = euler_angles_from_dcm_w32_fit(
+        + INT64_C(4054853068024446976) /* 0.10990701262248558 in Q35 */, 31);
+        /* 0.0941 .. 0.11, error 1.1e-10 */
+    const int32_t next_roll_case_angle_ser_3 = euler_angles_from_dcm_w32_near(
         euler_angles_from_dcm_w32_shr(euler_angles_from_dcm_w32_mul(
         next_roll_case_angle_square, next_roll_case_angle_ser_2), 2)
-        - INT64_C(5267120772635892064) /* 0.14276559461088406 in Q60 */
-        + (INT64_C(1) << 31), 32); /* Q-2.33, -0.143 .. -0.121, error 8.6e-11 */
-    const int32_t next_roll_case_angle_ser_4 = euler_angles_from_dcm_w32_fit(
+        - INT64_C(5267120772870045696) /* 0.14276559461088406 in Q35 */);
+        /* Q-2.33, -0.143 .. -0.121, error 1.1e-10 */
+    const int32_t next_roll_case_angle_ser_4 = euler_angles_from_dcm_w32_near(
         euler_angles_from_dcm_w32_shr(euler_angles_from_dcm_w32_mul(
         next_roll_case_angle_square, next_roll_case_angle_ser_3), 1)
-        + INT64_C(7378564090463267680) /* 0.19999638041759513 in Q60 */
-        + (INT64_C(1) << 31), 32); /* 0.172 .. 0.2, error 9.8e-11 */
-    const int32_t next_roll_case_angle_ser_5 = euler_angles_from_dcm_w32_fit(
+        + INT64_C(7378564090790150144) /* 0.19999638041759513 in Q34 */);
+        /* 0.172 .. 0.2, error 1.1e-10 */
+    const int32_t next_roll_case_angle_ser_5 = euler_angles_from_dcm_w32_near(
         euler_angles_from_dcm_w32_shr(euler_angles_from_dcm_w32_mul(
         next_roll_case_angle_square, next_roll_case_angle_ser_4), 2)
-        - INT64_C(6148913518682917232) /* 0.33333326976907529 in Q60 */
-        + (INT64_C(1) << 31), 32); /* Q-1.32, -0.334 .. -0.295, error 1.7e-10 */
-    const int32_t next_roll_case_angle_bend = euler_angles_from_dcm_w32_fit(
-        euler_angles_from_dcm_w32_mul(next_roll_case_angle_square,
-        next_roll_case_angle_ser_5)
-        - INT64_C(11967952160) /* 3.2439199325215087e-10 in Q60 */
-        + (INT32_C(1) << 30), 31); /* Q-3.34, -0.0639 .. -1.74e-10, error 1.2e-10 */
-    const int64_t next_roll_case_angle_atan = (int64_t)next_roll_case_angle_tangent
-        * (INT64_C(1) << 32) + euler_angles_from_dcm_w32_shr(euler_angles_from_dcm_w32_mul(
-        next_roll_case_angle_tangent, next_roll_case_angle_bend), 2);
-        /* Q-1.64, -0.392 .. 0.438, error 1.9e-10 */
+        - INT64_C(6148913518352531456) /* 0.33333326976907529 in Q34 */);
+        /* Q-1.32, -0.334 .. -0.295, error 1.9e-10 */
+    const int32_t next_roll_case_angle_bend = -6 /* 3.2439199325215087e-10 in Q34 */
+        + euler_angles_from_dcm_w32_fit(euler_angles_from_dcm_w32_mul(
+        next_roll_case_angle_square, next_roll_case_angle_ser_5) + (INT32_C(1) << 30), 31);
+        /* Q-3.34, -0.0639 .. -1.74e-10, error 1.5e-10 */
+    const int64_t next_roll_case_angle_atan = euler_angles_from_dcm_w32_shr(
+        euler_angles_from_dcm_w32_mul(next_roll_case_angle_tangent,
+        next_roll_case_angle_bend), 2)
+        + (int64_t)next_roll_case_angle_tangent * (INT64_C(1) << 32);
+        /* Q-1.64, -0.392 .. 0.438, error 2e-10 */
     const int64_t next_roll_case_angle_angle = euler_angles_from_dcm_w32_shr(
-        next_roll_case_angle_atan, 2) + INT64_C(3622009729038561420);
-        /* Q1.62, 0.394 .. 1.23, error 1.9e-10 */
-    int64_t next_roll_case_angle_octant; /* Q1.62, -1.84e-10 .. 0.786, error 1.9e-10 */
+        next_roll_case_angle_atan, 2) + INT64_C(3622009729038561421);
+        /* Q1.62, 0.394 .. 1.23, error 2e-10 */
+    int64_t next_roll_case_angle_octant; /* Q1.62, -1.96e-10 .. 0.786, error 2e-10 */
     if (next_roll_case_angle_beyond >= 0) {
         next_roll_case_angle_octant = next_roll_case_angle_angle;
     } else {
         next_roll_case_angle_octant = euler_angles_from_dcm_w32_shr(next_roll_case_angle_atan, 2);
     }
     const int64_t next_roll_case_angle_angle_2 = euler_angles_from_dcm_w32_shr(
-        -next_roll_case_angle_octant, 1) + INT64_C(3622009729038561420);
-        /* Q2.61, 0.785 .. 1.58, error 1.9e-10 */
-    int64_t next_roll_case_angle_quad; /* Q1.62, -1.84e-10 .. 1.58, error 1.9e-10 */
+        -next_roll_case_angle_octant, 1) + INT64_C(3622009729038561421);
+        /* Q2.61, 0.785 .. 1.58, error 2e-10 */
+    int64_t next_roll_case_angle_quad; /* Q1.62, -1.96e-10 .. 1.58, error 2e-10 */
     if ((int64_t)next_roll_case_angle_width >= (int64_t)next_roll_case_angle_height) {
         next_roll_case_angle_quad = next_roll_case_angle_octant;
     } else {
         next_roll_case_angle_quad = next_roll_case_angle_angle_2 * 2;
     }
     const int64_t next_roll_case_angle_angle_3 = euler_angles_from_dcm_w32_shr(
-        -next_roll_case_angle_quad, 2) + INT64_C(3622009729038561420);
-        /* Q3.60, 1.57 .. 3.15, error 1.9e-10 */
-    int64_t next_roll_case_angle_half; /* Q2.61, -1.84e-10 .. 3.15, error 1.9e-10 */
+        -next_roll_case_angle_quad, 2) + INT64_C(3622009729038561421);
+        /* Q3.60, 1.57 .. 3.15, error 2e-10 */
+    int64_t next_roll_case_angle_half; /* Q2.61, -1.96e-10 .. 3.15, error 2e-10 */
     if ((int64_t)C_33 >= 0) {
         next_roll_case_angle_half = euler_angles_from_dcm_w32_shr(next_roll_case_angle_quad, 1);
     } else {
         next_roll_case_angle_half = next_roll_case_angle_angle_3 * 2;
     }
     const int64_t next_roll_case_angle_angle_4 = -next_roll_case_angle_half;
-        /* Q2.61, -3.15 .. 1.84e-10, error 1.9e-10 */
-    int64_t next_roll_case_angle_side; /* Q2.61, -3.15 .. 3.15, error 1.9e-10 */
+        /* Q2.61, -3.15 .. 1.96e-10, error 2e-10 */
+    int64_t next_roll_case_angle_side; /* Q2.61, -3.15 .. 3.15, error 2e-10 */
     if ((int64_t)C_32 >= 0) {
         next_roll_case_angle_side = next_roll_case_angle_half;
     } else {
         next_roll_case_angle_side = next_roll_case_angle_angle_4;
     }
     const int64_t next_roll_case_angle = next_roll_case_angle_side;
-        /* Q2.61, -3.15 .. 3.15, error 1.9e-10 */
+        /* Q2.61, -3.15 .. 3.15, error 2e-10 */
     /* roll; held where pitch is vertical */
-    int64_t next_roll; /* Q2.61, -3.15 .. 3.15, error 1.9e-10 */
+    int64_t next_roll; /* Q2.61, -3.15 .. 3.15, error 2e-10 */
     if (4 >= cosine_squared) {
         next_roll = (int64_t)last_roll * (INT64_C(1) << 32);
     } else {
@@ -484,67 +500,67 @@ int euler_angles_from_dcm_w32(const int32_t state[9], const int32_t previous[3],
     const int32_t apart_square = euler_angles_from_dcm_w32_fit(euler_angles_from_dcm_w32_sqr(
         apart_tangent) + (INT32_C(1) << 30), 31);
         /* Q-2.33, -2.33e-10 .. 0.192, error 1.7e-10 */
-    const int32_t apart_series = euler_angles_from_dcm_w32_fit(euler_angles_from_dcm_w32_shr(
-        euler_angles_from_dcm_w32_mul(apart_square,
-        INT32_C(735255871) /* 0.042797524437051732 in Q34 */), 1)
-        - INT64_C(6065684321545150080) /* 0.08220535148788144 in Q60 */
-        + (INT64_C(1) << 31), 32); /* Q-3.34, -0.0823 .. -0.074, error 3.9e-11 */
+    const int32_t apart_series = -INT32_C(1412277185) /* 0.08220535148788144 in Q34 */
+        + euler_angles_from_dcm_w32_fit(euler_angles_from_dcm_w32_mul(apart_square,
+        INT32_C(367627936) /* 0.042797524437051732 in Q33 */), 32);
+        /* Q-3.34, -0.0823 .. -0.074, error 8.7e-11 */
     const int32_t apart_series_2 = euler_angles_from_dcm_w32_fit(euler_angles_from_dcm_w32_shr(
         euler_angles_from_dcm_w32_mul(apart_square, apart_series), 2)
-        + INT64_C(4054853067505913472) /* 0.10990701262248558 in Q60 */
-        + (INT32_C(1) << 30), 31); /* 0.0941 .. 0.11, error 5e-11 */
-    const int32_t apart_series_3 = euler_angles_from_dcm_w32_fit(euler_angles_from_dcm_w32_shr(
+        + INT64_C(4054853068024446976) /* 0.10990701262248558 in Q35 */, 31);
+        /* 0.0941 .. 0.11, error 1.1e-10 */
+    const int32_t apart_series_3 = euler_angles_from_dcm_w32_near(euler_angles_from_dcm_w32_shr(
         euler_angles_from_dcm_w32_mul(apart_square, apart_series_2), 2)
-        - INT64_C(5267120772635892064) /* 0.14276559461088406 in Q60 */
-        + (INT64_C(1) << 31), 32); /* Q-2.33, -0.143 .. -0.121, error 8.6e-11 */
-    const int32_t apart_series_4 = euler_angles_from_dcm_w32_fit(euler_angles_from_dcm_w32_shr(
+        - INT64_C(5267120772870045696) /* 0.14276559461088406 in Q35 */);
+        /* Q-2.33, -0.143 .. -0.121, error 1.1e-10 */
+    const int32_t apart_series_4 = euler_angles_from_dcm_w32_near(euler_angles_from_dcm_w32_shr(
         euler_angles_from_dcm_w32_mul(apart_square, apart_series_3), 1)
-        + INT64_C(7378564090463267680) /* 0.19999638041759513 in Q60 */
-        + (INT64_C(1) << 31), 32); /* 0.172 .. 0.2, error 9.8e-11 */
-    const int32_t apart_series_5 = euler_angles_from_dcm_w32_fit(euler_angles_from_dcm_w32_shr(
+        + INT64_C(7378564090790150144) /* 0.19999638041759513 in Q34 */);
+        /* 0.172 .. 0.2, error 1.1e-10 */
+    const int32_t apart_series_5 = euler_angles_from_dcm_w32_near(euler_angles_from_dcm_w32_shr(
         euler_angles_from_dcm_w32_mul(apart_square, apart_series_4), 2)
-        - INT64_C(6148913518682917232) /* 0.33333326976907529 in Q60 */
-        + (INT64_C(1) << 31), 32); /* Q-1.32, -0.334 .. -0.295, error 1.7e-10 */
-    const int32_t apart_bend = euler_angles_from_dcm_w32_fit(euler_angles_from_dcm_w32_mul(
-        apart_square, apart_series_5)
-        - INT64_C(11967952160) /* 3.2439199325215087e-10 in Q60 */
-        + (INT32_C(1) << 30), 31); /* Q-3.34, -0.0639 .. -1.74e-10, error 1.2e-10 */
-    const int64_t apart_arctangent = (int64_t)apart_tangent * (INT64_C(1) << 32)
-        + euler_angles_from_dcm_w32_shr(euler_angles_from_dcm_w32_mul(apart_tangent,
-        apart_bend), 2); /* Q-1.64, -0.392 .. 0.438, error 1.9e-10 */
+        - INT64_C(6148913518352531456) /* 0.33333326976907529 in Q34 */);
+        /* Q-1.32, -0.334 .. -0.295, error 1.9e-10 */
+    const int32_t apart_bend = euler_angles_from_dcm_w32_asr(euler_angles_from_dcm_w32_fit(
+        euler_angles_from_dcm_w32_mul(apart_square, apart_series_5), 32)
+        - 3 /* 3.2439199325215087e-10 in Q33 */ + 1, 1);
+        /* Q-1.32, -0.0639 .. 0, error 2.4e-10 */
+    const int64_t apart_arctangent = euler_angles_from_dcm_w32_mul(apart_tangent, apart_bend)
+        + (int64_t)apart_tangent * (INT64_C(1) << 32);
+        /* Q-1.64, -0.392 .. 0.438, error 2.4e-10 */
     const int64_t apart_angle = euler_angles_from_dcm_w32_shr(apart_arctangent, 2)
-        + INT64_C(3622009729038561420); /* Q1.62, 0.394 .. 1.23, error 1.9e-10 */
-    int64_t apart_octant; /* Q1.62, -1.84e-10 .. 0.786, error 1.9e-10 */
+        + INT64_C(3622009729038561421); /* Q1.62, 0.394 .. 1.23, error 2.4e-10 */
+    int64_t apart_octant; /* Q1.62, -2.35e-10 .. 0.786, error 2.4e-10 */
     if (apart_beyond >= 0) {
         apart_octant = apart_angle;
     } else {
         apart_octant = euler_angles_from_dcm_w32_shr(apart_arctangent, 2);
     }
     const int64_t apart_angle_2 = euler_angles_from_dcm_w32_shr(-apart_octant, 1)
-        + INT64_C(3622009729038561420); /* Q2.61, 0.785 .. 1.58, error 1.9e-10 */
-    int64_t apart_quadrant; /* Q1.62, -1.84e-10 .. 1.58, error 1.9e-10 */
+        + INT64_C(3622009729038561421); /* Q2.61, 0.785 .. 1.58, error 2.4e-10 */
+    int64_t apart_quadrant; /* Q1.62, -2.35e-10 .. 1.58, error 2.4e-10 */
     if ((int64_t)apart_width >= (int64_t)apart_height) {
         apart_quadrant = apart_octant;
     } else {
         apart_quadrant = apart_angle_2 * 2;
     }
     const int64_t apart_angle_3 = euler_angles_from_dcm_w32_shr(-apart_quadrant, 2)
-        + INT64_C(3622009729038561420); /* Q3.60, 1.57 .. 3.15, error 1.9e-10 */
-    int64_t apart_half; /* Q2.61, -1.84e-10 .. 3.15, error 1.9e-10 */
+        + INT64_C(3622009729038561421); /* Q3.60, 1.57 .. 3.15, error 2.4e-10 */
+    int64_t apart_half; /* Q2.61, -2.35e-10 .. 3.15, error 2.4e-10 */
     if ((int64_t)apart_taken_2 >= 0) {
         apart_half = euler_angles_from_dcm_w32_shr(apart_quadrant, 1);
     } else {
         apart_half = apart_angle_3 * 2;
     }
-    const int64_t apart_angle_4 = -apart_half; /* Q2.61, -3.15 .. 1.84e-10, error 1.9e-10 */
-    int64_t apart_side; /* Q2.61, -3.15 .. 3.15, error 1.9e-10 */
+    const int64_t apart_angle_4 = -apart_half; /* Q2.61, -3.15 .. 2.35e-10, error 2.4e-10 */
+    int64_t apart_side; /* Q2.61, -3.15 .. 3.15, error 2.4e-10 */
     if ((int64_t)apart_taken >= 0) {
         apart_side = apart_half;
     } else {
         apart_side = apart_angle_4;
     }
     /* the angle between or together */
-    const int64_t apart = apart_side; /* Q2.61, -3.15 .. 3.15, error 3.2e-09 */
+    const int64_t apart = euler_angles_from_dcm_w32_shr(apart_side, 1);
+        /* Q3.60, -3.15 .. 3.15, error 3.2e-09 */
     const int64_t next_heading_case_angle_neg = -(int64_t)C_21; /* Q33.30, -1.07 .. 1.07, exact */
     int32_t next_hdg_case_angle_height = C_21; /* Q1.30, 0 .. 1.07, exact */
     if (next_heading_case_angle_neg > next_hdg_case_angle_height) {
@@ -592,91 +608,88 @@ int euler_angles_from_dcm_w32(const int32_t state[9], const int32_t previous[3],
         euler_angles_from_dcm_w32_div((int64_t)next_heading_case_angle_num
         * (INT64_C(1) << 32), next_heading_case_angle_den), 0);
         /* Q-1.32, -0.392 .. 0.438, error 1.2e-10 */
-    const int32_t next_hdg_case_angle_square = euler_angles_from_dcm_w32_fit(
-        euler_angles_from_dcm_w32_sqr(next_hdg_case_angle_tangent)
-        + (INT32_C(1) << 30), 31); /* Q-2.33, -2.33e-10 .. 0.192, error 1.7e-10 */
-    const int32_t next_heading_case_angle_ser = euler_angles_from_dcm_w32_fit(
-        euler_angles_from_dcm_w32_shr(euler_angles_from_dcm_w32_mul(
-        next_hdg_case_angle_square, INT32_C(735255871) /* 0.042797524437051732 in Q34 */),
-        1) - INT64_C(6065684321545150080) /* 0.08220535148788144 in Q60 */
-        + (INT64_C(1) << 31), 32); /* Q-3.34, -0.0823 .. -0.074, error 3.9e-11 */
-    const int32_t next_hdg_case_angle_ser_2 = euler_angles_from_dcm_w32_fit(
-        euler_angles_from_dcm_w32_shr(euler_angles_from_dcm_w32_mul(
-        next_hdg_case_angle_square, next_heading_case_angle_ser), 2)
-        + INT64_C(4054853067505913472) /* 0.10990701262248558 in Q60 */
-        + (INT32_C(1) << 30), 31); /* 0.0941 .. 0.11, error 5e-11 */
+    const int32_t next_hdg_case_angle_square = euler_angles_from_dcm_w32_near(
+        euler_angles_from_dcm_w32_sqr(next_hdg_case_angle_tangent));
+        /* Q-1.32, -2.33e-10 .. 0.192, error 2.2e-10 */
+    const int32_t next_heading_case_angle_ser = -INT32_C(
+        1412277185) /* 0.08220535148788144 in Q34 */ + euler_angles_from_dcm_w32_fit(
+        euler_angles_from_dcm_w32_mul(next_hdg_case_angle_square,
+        INT32_C(735255871) /* 0.042797524437051732 in Q34 */), 32);
+        /* Q-3.34, -0.0823 .. -0.074, error 8.3e-11 */
+    const int32_t next_hdg_case_angle_ser_2 = euler_angles_from_dcm_w32_fit(INT32_C(
+        1888188099) /* 0.10990701262248558 in Q34 */ + euler_angles_from_dcm_w32_shr(
+        euler_angles_from_dcm_w32_mul(next_hdg_case_angle_square,
+        next_heading_case_angle_ser), 32), 0); /* 0.0941 .. 0.11, error 1.1e-10 */
     const int32_t next_hdg_case_angle_ser_3 = euler_angles_from_dcm_w32_fit(
         euler_angles_from_dcm_w32_shr(euler_angles_from_dcm_w32_mul(
-        next_hdg_case_angle_square, next_hdg_case_angle_ser_2), 2)
-        - INT64_C(5267120772635892064) /* 0.14276559461088406 in Q60 */
-        + (INT64_C(1) << 31), 32); /* Q-2.33, -0.143 .. -0.121, error 8.6e-11 */
-    const int32_t next_hdg_case_angle_ser_4 = euler_angles_from_dcm_w32_fit(
+        next_hdg_case_angle_square, next_hdg_case_angle_ser_2), 1)
+        - INT64_C(5267120771796303872) /* 0.14276559461088406 in Q34 */, 32);
+        /* Q-2.33, -0.143 .. -0.121, error 1.9e-10 */
+    const int32_t next_hdg_case_angle_ser_4 = INT32_C(
+        1717955826) /* 0.19999638041759513 in Q33 */ + euler_angles_from_dcm_w32_fit(
+        euler_angles_from_dcm_w32_mul(next_hdg_case_angle_square,
+        next_hdg_case_angle_ser_3), 32); /* 0.172 .. 0.2, error 2.4e-10 */
+    const int32_t next_hdg_case_angle_ser_5 = euler_angles_from_dcm_w32_near(
         euler_angles_from_dcm_w32_shr(euler_angles_from_dcm_w32_mul(
-        next_hdg_case_angle_square, next_hdg_case_angle_ser_3), 1)
-        + INT64_C(7378564090463267680) /* 0.19999638041759513 in Q60 */
-        + (INT64_C(1) << 31), 32); /* 0.172 .. 0.2, error 9.8e-11 */
-    const int32_t next_hdg_case_angle_ser_5 = euler_angles_from_dcm_w32_fit(
-        euler_angles_from_dcm_w32_shr(euler_angles_from_dcm_w32_mul(
-        next_hdg_case_angle_square, next_hdg_case_angle_ser_4), 2)
-        - INT64_C(6148913518682917232) /* 0.33333326976907529 in Q60 */
-        + (INT64_C(1) << 31), 32); /* Q-1.32, -0.334 .. -0.295, error 1.7e-10 */
-    const int32_t next_hdg_case_angle_bend = euler_angles_from_dcm_w32_fit(
-        euler_angles_from_dcm_w32_mul(next_hdg_case_angle_square, next_hdg_case_angle_ser_5)
-        - INT64_C(11967952160) /* 3.2439199325215087e-10 in Q60 */
-        + (INT32_C(1) << 30), 31); /* Q-3.34, -0.0639 .. -1.74e-10, error 1.2e-10 */
-    const int64_t next_hdg_case_angle_atan = (int64_t)next_hdg_case_angle_tangent
-        * (INT64_C(1) << 32) + euler_angles_from_dcm_w32_shr(euler_angles_from_dcm_w32_mul(
-        next_hdg_case_angle_tangent, next_hdg_case_angle_bend), 2);
-        /* Q-1.64, -0.392 .. 0.438, error 1.9e-10 */
+        next_hdg_case_angle_square, next_hdg_case_angle_ser_4), 1)
+        - INT64_C(6148913519426273280) /* 0.33333326976907529 in Q33 */);
+        /* Q-1.32, -0.334 .. -0.295, error 2.5e-10 */
+    const int32_t next_hdg_case_angle_bend = -1 /* 3.2439199325215087e-10 in Q32 */
+        + euler_angles_from_dcm_w32_near(euler_angles_from_dcm_w32_mul(
+        next_hdg_case_angle_square, next_hdg_case_angle_ser_5));
+        /* Q-1.32, -0.0639 .. 2.33e-10, error 3.3e-10 */
+    const int64_t next_hdg_case_angle_atan = euler_angles_from_dcm_w32_mul(
+        next_hdg_case_angle_tangent, next_hdg_case_angle_bend)
+        + (int64_t)next_hdg_case_angle_tangent * (INT64_C(1) << 32);
+        /* Q-1.64, -0.392 .. 0.438, error 2.8e-10 */
     const int64_t next_hdg_case_angle_angle = euler_angles_from_dcm_w32_shr(
-        next_hdg_case_angle_atan, 2) + INT64_C(3622009729038561420);
-        /* Q1.62, 0.394 .. 1.23, error 1.9e-10 */
-    int64_t next_hdg_case_angle_octant; /* Q1.62, -1.84e-10 .. 0.786, error 1.9e-10 */
+        next_hdg_case_angle_atan, 2) + INT64_C(3622009729038561421);
+        /* Q1.62, 0.394 .. 1.23, error 2.8e-10 */
+    int64_t next_hdg_case_angle_octant; /* Q1.62, -2.77e-10 .. 0.786, error 2.8e-10 */
     if (next_hdg_case_angle_beyond >= 0) {
         next_hdg_case_angle_octant = next_hdg_case_angle_angle;
     } else {
         next_hdg_case_angle_octant = euler_angles_from_dcm_w32_shr(next_hdg_case_angle_atan, 2);
     }
     const int64_t next_hdg_case_angle_angle_2 = euler_angles_from_dcm_w32_shr(
-        -next_hdg_case_angle_octant, 1) + INT64_C(3622009729038561420);
-        /* Q2.61, 0.785 .. 1.58, error 1.9e-10 */
-    int64_t next_hdg_case_angle_quad; /* Q1.62, -1.84e-10 .. 1.58, error 1.9e-10 */
+        -next_hdg_case_angle_octant, 1) + INT64_C(3622009729038561421);
+        /* Q2.61, 0.785 .. 1.58, error 2.8e-10 */
+    int64_t next_hdg_case_angle_quad; /* Q1.62, -2.77e-10 .. 1.58, error 2.8e-10 */
     if ((int64_t)next_hdg_case_angle_width >= (int64_t)next_hdg_case_angle_height) {
         next_hdg_case_angle_quad = next_hdg_case_angle_octant;
     } else {
         next_hdg_case_angle_quad = next_hdg_case_angle_angle_2 * 2;
     }
     const int64_t next_hdg_case_angle_angle_3 = euler_angles_from_dcm_w32_shr(
-        -next_hdg_case_angle_quad, 2) + INT64_C(3622009729038561420);
-        /* Q3.60, 1.57 .. 3.15, error 1.9e-10 */
-    int64_t next_hdg_case_angle_half; /* Q2.61, -1.84e-10 .. 3.15, error 1.9e-10 */
+        -next_hdg_case_angle_quad, 2) + INT64_C(3622009729038561421);
+        /* Q3.60, 1.57 .. 3.15, error 2.8e-10 */
+    int64_t next_hdg_case_angle_half; /* Q2.61, -2.77e-10 .. 3.15, error 2.8e-10 */
     if ((int64_t)C_11 >= 0) {
         next_hdg_case_angle_half = euler_angles_from_dcm_w32_shr(next_hdg_case_angle_quad, 1);
     } else {
         next_hdg_case_angle_half = next_hdg_case_angle_angle_3 * 2;
     }
     const int64_t next_hdg_case_angle_angle_4 = -next_hdg_case_angle_half;
-        /* Q2.61, -3.15 .. 1.84e-10, error 1.9e-10 */
-    int64_t next_hdg_case_angle_side; /* Q2.61, -3.15 .. 3.15, error 1.9e-10 */
+        /* Q2.61, -3.15 .. 2.77e-10, error 2.8e-10 */
+    int64_t next_hdg_case_angle_side; /* Q2.61, -3.15 .. 3.15, error 2.8e-10 */
     if ((int64_t)C_21 >= 0) {
         next_hdg_case_angle_side = next_hdg_case_angle_half;
     } else {
         next_hdg_case_angle_side = next_hdg_case_angle_angle_4;
     }
     const int64_t next_heading_case_angle = next_hdg_case_angle_side;
-        /* Q2.61, -3.15 .. 3.15, error 1.9e-10 */
+        /* Q2.61, -3.15 .. 3.15, error 2.8e-10 */
     const int64_t next_hdg_case_wrap_arg_sel_case = -next_roll;
-        /* Q2.61, -3.15 .. 3.15, error 1.9e-10 */
-    int64_t next_hdg_case_wrap_arg_sel; /* Q2.61, -3.15 .. 3.15, error 1.9e-10 */
+        /* Q2.61, -3.15 .. 3.15, error 2e-10 */
+    int64_t next_hdg_case_wrap_arg_sel; /* Q2.61, -3.15 .. 3.15, error 2e-10 */
     if (0 >= (int64_t)C_31) {
         next_hdg_case_wrap_arg_sel = next_roll;
     } else {
         next_hdg_case_wrap_arg_sel = next_hdg_case_wrap_arg_sel_case;
     }
-    const int32_t next_heading_case_wrap_arg = euler_angles_from_dcm_w32_fit(
-        euler_angles_from_dcm_w32_shr(apart, 1)
-        + euler_angles_from_dcm_w32_shr(next_hdg_case_wrap_arg_sel, 1)
-        + (INT64_C(1) << 31), 32); /* Q3.28, -6.29 .. 6.29, error 5.2e-09 */
+    const int32_t next_heading_case_wrap_arg = euler_angles_from_dcm_w32_near(apart
+        + euler_angles_from_dcm_w32_shr(next_hdg_case_wrap_arg_sel, 1));
+        /* Q3.28, -6.29 .. 6.29, error 5.3e-09 */
     int32_t next_hdg_case_wrap_taken; /* Q3.28, -6.29 .. 6.29, exact */
     if ((int64_t)next_heading_case_wrap_arg >= INT32_C(1686629785)) {
         next_hdg_case_wrap_taken = euler_angles_from_dcm_w32_fit(INT32_C(1686629785), 0);
@@ -700,18 +713,18 @@ int euler_angles_from_dcm_w32(const int32_t state[9], const int32_t previous[3],
         next_heading_case_principal = (int64_t)next_hdg_case_wrap_taken * (INT32_C(1) << 30);
     }
     const int64_t next_heading_case_principal_ = next_heading_case_principal;
-        /* Q5.58, -3.15 .. 3.15, error 5.2e-09 */
+        /* Q5.58, -3.15 .. 3.15, error 5.3e-09 */
     /* heading */
-    int64_t next_heading; /* Q2.61, -3.15 .. 3.15, error 5.2e-09 */
+    int64_t next_heading; /* Q2.61, -3.15 .. 3.15, error 5.3e-09 */
     if (cosine_squared >= (INT64_C(1) << 58)) {
         next_heading = next_heading_case_angle;
     } else {
         next_heading = next_heading_case_principal_ * 8;
     }
-    const int32_t found_roll = euler_angles_from_dcm_w32_fit(next_roll
-        + (INT64_C(1) << 31), 32); /* Q2.29, -3.15 .. 3.15, error 1.2e-09 */
-    const int32_t found_heading = euler_angles_from_dcm_w32_fit(next_heading
-        + (INT64_C(1) << 31), 32); /* Q2.29, -3.15 .. 3.15, error 6.2e-09 */
+    const int32_t found_roll = euler_angles_from_dcm_w32_near(next_roll);
+        /* Q2.29, -3.15 .. 3.15, error 1.2e-09 */
+    const int32_t found_heading = euler_angles_from_dcm_w32_near(next_heading);
+        /* Q2.29, -3.15 .. 3.15, error 6.2e-09 */
     next[0] = found_roll;
     next[1] = next_pitch;
     next[2] = found_heading;

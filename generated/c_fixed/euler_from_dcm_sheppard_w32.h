@@ -10,7 +10,7 @@
  * Source: P. G. Savage, Strapdown System Algorithms, AGARD Lecture Series 133 (1984), paper 3,
  *     equation (18).
  * The sign is continuous for turns of less than 60 degrees from call to call.
- * Integer operations of one call: 21 add, 4 multiply, 13 shift, 1 divide, 1 sqrt, 19 compare; 26
+ * Integer operations of one call: 21 add, 4 multiply, 11 shift, 1 divide, 1 sqrt, 19 compare; 26
  *     temporaries.
  *
  * A number in format Qm.n is an integer times 2^-n. Rounding: nearest. No intermediate sum or

@@ -10,7 +10,7 @@
  *     inverted; largest element first as in S. W. Shepperd, J. Guidance and Control 1 (1978)
  *     223-224.
  * The scalar part of the result is not negative.
- * Integer operations of one call: 21 add, 4 multiply, 13 shift, 1 divide, 1 sqrt, 16 compare; 25
+ * Integer operations of one call: 21 add, 4 multiply, 11 shift, 1 divide, 1 sqrt, 16 compare; 25
  *     temporaries.
  *
  * A number in format Qm.n is an integer times 2^-n. Rounding: nearest. No intermediate sum or

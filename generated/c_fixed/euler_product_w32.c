@@ -12,7 +12,7 @@
 /* Nonzero if the magnitude of x exceeds the limit. */
 static inline int euler_product_w32_out(int32_t x, int32_t limit)
 {
-#if defined(__GNUC__) && (defined(__ARM_ARCH_6M__) || defined(__ARM_ARCH_8M_BASE__))
+#if defined(__GNUC__) && defined(__arm__)
     return ((uint32_t)x + (uint32_t)limit) > (2u * (uint32_t)limit); /* fewer instructions there */
 #else
     return (x < -limit) || (x > limit);
@@ -44,6 +44,18 @@ static inline int64_t euler_product_w32_mul(int32_t a, int32_t b)
     return (int64_t)a * (int64_t)b;
 }
 #endif
+
+/* The exact product of two words, times -1. An instruction that accumulates a product takes it
+ * with a negated factor.
+ */
+static inline int64_t euler_product_w32_nml(int32_t a, int32_t b)
+{
+#if defined(__ARM_ARCH_ISA_THUMB) && (__ARM_ARCH_ISA_THUMB > 1)
+    return euler_product_w32_mul(a, -b);
+#else
+    return -euler_product_w32_mul(a, b);
+#endif
+}
 
 /* x / 2^n, rounded down, where the proof of the ranges shows that it fits into a word: then the
  * 32 bits of x from bit n on, read as a number with a sign, are that quotient. For n above 32 the
@@ -80,20 +92,20 @@ int euler_product_w32(const int32_t state[4], const int32_t transition[4], int32
     const int32_t p_y = transition[1];
     const int32_t p_z = transition[2];
     const int32_t p_s = transition[3];
-    if (euler_product_w32_out(e_x, INT32_C(1140850688))
-        || euler_product_w32_out(e_y, INT32_C(1140850688))
-        || euler_product_w32_out(e_z, INT32_C(1140850688))
-        || euler_product_w32_out(e_s, INT32_C(1140850688))
-        || euler_product_w32_out(p_x, INT32_C(1140850688))
+    if (euler_product_w32_out(p_x, INT32_C(1140850688))
         || euler_product_w32_out(p_y, INT32_C(1140850688))
         || euler_product_w32_out(p_z, INT32_C(1140850688))
-        || euler_product_w32_out(p_s, INT32_C(1140850688))) {
+        || euler_product_w32_out(p_s, INT32_C(1140850688))
+        || euler_product_w32_out(e_x, INT32_C(1140850688))
+        || euler_product_w32_out(e_y, INT32_C(1140850688))
+        || euler_product_w32_out(e_z, INT32_C(1140850688))
+        || euler_product_w32_out(e_s, INT32_C(1140850688))) {
         return 1;
     }
     /* Euler parameters, body to reference, scalar last, after the step */
     const int64_t next_s_raw = euler_product_w32_shr(euler_product_w32_mul(e_s, p_s)
-        - euler_product_w32_mul(e_x, p_x) - euler_product_w32_mul(e_y, p_y)
-        - euler_product_w32_mul(e_z, p_z) + (INT32_C(1) << 29), 30);
+        + euler_product_w32_nml(p_x, e_x) + euler_product_w32_nml(p_y, e_y)
+        + euler_product_w32_nml(p_z, e_z) + (INT32_C(1) << 29), 30);
     if ((next_s_raw < (-INT32_C(1140850688))) || (next_s_raw > INT32_C(1140850688))) {
         return 2;
     }
@@ -101,14 +113,14 @@ int euler_product_w32(const int32_t state[4], const int32_t transition[4], int32
         /* Q1.30, -1.07 .. 1.07, error 4.7e-10 */
     const int64_t next_x_raw = euler_product_w32_shr(euler_product_w32_mul(e_s, p_x)
         + euler_product_w32_mul(e_x, p_s) + euler_product_w32_mul(e_y, p_z)
-        - euler_product_w32_mul(e_z, p_y) + (INT32_C(1) << 29), 30);
+        + euler_product_w32_nml(p_y, e_z) + (INT32_C(1) << 29), 30);
     if ((next_x_raw < (-INT32_C(1140850688))) || (next_x_raw > INT32_C(1140850688))) {
         return 2;
     }
     const int32_t next_x = euler_product_w32_fit(next_x_raw, 0);
         /* Q1.30, -1.07 .. 1.07, error 4.7e-10 */
     const int64_t next_y_raw = euler_product_w32_shr(euler_product_w32_mul(e_s, p_y)
-        - euler_product_w32_mul(e_x, p_z) + euler_product_w32_mul(e_y, p_s)
+        + euler_product_w32_nml(p_z, e_x) + euler_product_w32_mul(e_y, p_s)
         + euler_product_w32_mul(e_z, p_x) + (INT32_C(1) << 29), 30);
     if ((next_y_raw < (-INT32_C(1140850688))) || (next_y_raw > INT32_C(1140850688))) {
         return 2;
@@ -116,7 +128,7 @@ int euler_product_w32(const int32_t state[4], const int32_t transition[4], int32
     const int32_t next_y = euler_product_w32_fit(next_y_raw, 0);
         /* Q1.30, -1.07 .. 1.07, error 4.7e-10 */
     const int64_t next_z_raw = euler_product_w32_shr(euler_product_w32_mul(e_s, p_z)
-        + euler_product_w32_mul(e_x, p_y) - euler_product_w32_mul(e_y, p_x)
+        + euler_product_w32_mul(e_x, p_y) + euler_product_w32_nml(p_x, e_y)
         + euler_product_w32_mul(e_z, p_s) + (INT32_C(1) << 29), 30);
     if ((next_z_raw < (-INT32_C(1140850688))) || (next_z_raw > INT32_C(1140850688))) {
         return 2;

@@ -12,7 +12,7 @@
 /* Nonzero if the magnitude of x exceeds the limit. */
 static inline int euler_rk1_2_w32_out(int32_t x, int32_t limit)
 {
-#if defined(__GNUC__) && (defined(__ARM_ARCH_6M__) || defined(__ARM_ARCH_8M_BASE__))
+#if defined(__GNUC__) && defined(__arm__)
     return ((uint32_t)x + (uint32_t)limit) > (2u * (uint32_t)limit); /* fewer instructions there */
 #else
     return (x < -limit) || (x > limit);
@@ -45,6 +45,18 @@ static inline int64_t euler_rk1_2_w32_mul(int32_t a, int32_t b)
 }
 #endif
 
+/* The exact product of two words, times -1. An instruction that accumulates a product takes it
+ * with a negated factor.
+ */
+static inline int64_t euler_rk1_2_w32_nml(int32_t a, int32_t b)
+{
+#if defined(__ARM_ARCH_ISA_THUMB) && (__ARM_ARCH_ISA_THUMB > 1)
+    return euler_rk1_2_w32_mul(a, -b);
+#else
+    return -euler_rk1_2_w32_mul(a, b);
+#endif
+}
+
 /* x / 2^n, rounded down, where the proof of the ranges shows that it fits into a word: then the
  * 32 bits of x from bit n on, read as a number with a sign, are that quotient. For n above 32 the
  * high word of x is shifted on. Nothing is left to the compiler: no right shift of a negative
@@ -64,6 +76,21 @@ static inline int32_t euler_rk1_2_w32_fit(int64_t x, int n)
 #endif
 }
 
+/* x / 2^32, to the nearest, where the proof of the ranges shows that it fits into a word: the high
+ * word of x, and one more if the first bit of the low one is set.
+ */
+static inline int32_t euler_rk1_2_w32_near(int64_t x)
+{
+#ifdef __FRAMAC__
+    const int64_t moved = x + INT64_C(2147483648);
+    return (int32_t)((moved < 0) ? ~(~moved >> 32) : (moved >> 32));
+#else
+    const uint32_t carry = (uint32_t)x >> 31;
+    const uint32_t bits = (uint32_t)((uint64_t)x >> 32) + carry;
+    return (bits <= (UINT32_MAX >> 1)) ? (int32_t)bits : (-1 - (int32_t)(UINT32_MAX - bits));
+#endif
+}
+
 int euler_rk1_2_w32(const int32_t state[4], const int32_t increments[6], int32_t next[4])
 {
     const int32_t e_x = state[0];
@@ -76,16 +103,16 @@ int euler_rk1_2_w32(const int32_t state[4], const int32_t increments[6], int32_t
     const int32_t d2_x = increments[3];
     const int32_t d2_y = increments[4];
     const int32_t d2_z = increments[5];
-    if (euler_rk1_2_w32_out(e_x, INT32_C(1140850688))
-        || euler_rk1_2_w32_out(e_y, INT32_C(1140850688))
-        || euler_rk1_2_w32_out(e_z, INT32_C(1140850688))
-        || euler_rk1_2_w32_out(e_s, INT32_C(1140850688))
-        || euler_rk1_2_w32_out(d1_x, (INT32_C(1) << 30))
+    if (euler_rk1_2_w32_out(d1_x, (INT32_C(1) << 30))
         || euler_rk1_2_w32_out(d1_y, (INT32_C(1) << 30))
         || euler_rk1_2_w32_out(d1_z, (INT32_C(1) << 30))
         || euler_rk1_2_w32_out(d2_x, (INT32_C(1) << 30))
         || euler_rk1_2_w32_out(d2_y, (INT32_C(1) << 30))
-        || euler_rk1_2_w32_out(d2_z, (INT32_C(1) << 30))) {
+        || euler_rk1_2_w32_out(d2_z, (INT32_C(1) << 30))
+        || euler_rk1_2_w32_out(e_x, INT32_C(1140850688))
+        || euler_rk1_2_w32_out(e_y, INT32_C(1140850688))
+        || euler_rk1_2_w32_out(e_z, INT32_C(1140850688))
+        || euler_rk1_2_w32_out(e_s, INT32_C(1140850688))) {
         return 1;
     }
     /* half the rate times the step, at node 0 */
@@ -96,18 +123,18 @@ int euler_rk1_2_w32(const int32_t state[4], const int32_t increments[6], int32_t
     const int32_t half_turn_0_z = euler_rk1_2_w32_fit(euler_rk1_2_w32_mul(d1_z, 3)
         - (int64_t)d2_z + 2, 2); /* Q-1.32, -0.251 .. 0.251, error 1.2e-10 */
     /* Euler parameters, body to reference, scalar last, after the step */
-    const int32_t next_s = e_s + euler_rk1_2_w32_fit(-euler_rk1_2_w32_mul(e_x, half_turn_0_x)
-        - euler_rk1_2_w32_mul(e_y, half_turn_0_y) - euler_rk1_2_w32_mul(e_z, half_turn_0_z)
-        + (INT64_C(1) << 31), 32); /* Q1.30, -1.86 .. 1.86, error 8.4e-10 */
-    const int32_t next_x = e_x + euler_rk1_2_w32_fit(euler_rk1_2_w32_mul(e_s, half_turn_0_x)
-        + euler_rk1_2_w32_mul(e_y, half_turn_0_z) - euler_rk1_2_w32_mul(e_z, half_turn_0_y)
-        + (INT64_C(1) << 31), 32); /* Q1.30, -1.86 .. 1.86, error 8.4e-10 */
-    const int32_t next_y = e_y + euler_rk1_2_w32_fit(euler_rk1_2_w32_mul(e_s, half_turn_0_y)
-        - euler_rk1_2_w32_mul(e_x, half_turn_0_z) + euler_rk1_2_w32_mul(e_z, half_turn_0_x)
-        + (INT64_C(1) << 31), 32); /* Q1.30, -1.86 .. 1.86, error 8.4e-10 */
-    const int32_t next_z = e_z + euler_rk1_2_w32_fit(euler_rk1_2_w32_mul(e_s, half_turn_0_z)
-        + euler_rk1_2_w32_mul(e_x, half_turn_0_y) - euler_rk1_2_w32_mul(e_y, half_turn_0_x)
-        + (INT64_C(1) << 31), 32); /* Q1.30, -1.86 .. 1.86, error 8.4e-10 */
+    const int32_t next_s = e_s + euler_rk1_2_w32_near(euler_rk1_2_w32_nml(half_turn_0_x, e_x)
+        + euler_rk1_2_w32_nml(half_turn_0_y, e_y)
+        + euler_rk1_2_w32_nml(half_turn_0_z, e_z)); /* Q1.30, -1.86 .. 1.86, error 8.4e-10 */
+    const int32_t next_x = e_x + euler_rk1_2_w32_near(euler_rk1_2_w32_mul(e_s, half_turn_0_x)
+        + euler_rk1_2_w32_mul(e_y, half_turn_0_z)
+        + euler_rk1_2_w32_nml(half_turn_0_y, e_z)); /* Q1.30, -1.86 .. 1.86, error 8.4e-10 */
+    const int32_t next_y = e_y + euler_rk1_2_w32_near(euler_rk1_2_w32_mul(e_s, half_turn_0_y)
+        + euler_rk1_2_w32_nml(half_turn_0_z, e_x)
+        + euler_rk1_2_w32_mul(e_z, half_turn_0_x)); /* Q1.30, -1.86 .. 1.86, error 8.4e-10 */
+    const int32_t next_z = e_z + euler_rk1_2_w32_near(euler_rk1_2_w32_mul(e_s, half_turn_0_z)
+        + euler_rk1_2_w32_mul(e_x, half_turn_0_y)
+        + euler_rk1_2_w32_nml(half_turn_0_x, e_y)); /* Q1.30, -1.86 .. 1.86, error 8.4e-10 */
     next[0] = next_x;
     next[1] = next_y;
     next[2] = next_z;

@@ -12,7 +12,7 @@
 /* Nonzero if the magnitude of x exceeds the limit. */
 static inline int euler_rk2_2_w32_out(int32_t x, int32_t limit)
 {
-#if defined(__GNUC__) && (defined(__ARM_ARCH_6M__) || defined(__ARM_ARCH_8M_BASE__))
+#if defined(__GNUC__) && defined(__arm__)
     return ((uint32_t)x + (uint32_t)limit) > (2u * (uint32_t)limit); /* fewer instructions there */
 #else
     return (x < -limit) || (x > limit);
@@ -45,6 +45,18 @@ static inline int64_t euler_rk2_2_w32_mul(int32_t a, int32_t b)
 }
 #endif
 
+/* The exact product of two words, times -1. An instruction that accumulates a product takes it
+ * with a negated factor.
+ */
+static inline int64_t euler_rk2_2_w32_nml(int32_t a, int32_t b)
+{
+#if defined(__ARM_ARCH_ISA_THUMB) && (__ARM_ARCH_ISA_THUMB > 1)
+    return euler_rk2_2_w32_mul(a, -b);
+#else
+    return -euler_rk2_2_w32_mul(a, b);
+#endif
+}
+
 /* The exact square of a word. */
 static inline int64_t euler_rk2_2_w32_sqr(int32_t a)
 {
@@ -74,6 +86,12 @@ static inline int32_t euler_rk2_2_w32_fit(int64_t x, int n)
 #endif
 }
 
+/* x / 2^n of a word, rounded down. */
+static inline int32_t euler_rk2_2_w32_asr(int32_t x, int n)
+{
+    return (x >= 0) ? (x >> n) : ~(~x >> n);
+}
+
 int euler_rk2_2_w32(const int32_t state[4], const int32_t increments[6], int32_t next[4])
 {
     const int32_t e_x = state[0];
@@ -86,34 +104,26 @@ int euler_rk2_2_w32(const int32_t state[4], const int32_t increments[6], int32_t
     const int32_t d2_x = increments[3];
     const int32_t d2_y = increments[4];
     const int32_t d2_z = increments[5];
-    if (euler_rk2_2_w32_out(e_x, INT32_C(1140850688))
-        || euler_rk2_2_w32_out(e_y, INT32_C(1140850688))
-        || euler_rk2_2_w32_out(e_z, INT32_C(1140850688))
-        || euler_rk2_2_w32_out(e_s, INT32_C(1140850688))
-        || euler_rk2_2_w32_out(d1_x, (INT32_C(1) << 29))
+    if (euler_rk2_2_w32_out(d1_x, (INT32_C(1) << 29))
         || euler_rk2_2_w32_out(d1_y, (INT32_C(1) << 29))
         || euler_rk2_2_w32_out(d1_z, (INT32_C(1) << 29))
         || euler_rk2_2_w32_out(d2_x, (INT32_C(1) << 29))
         || euler_rk2_2_w32_out(d2_y, (INT32_C(1) << 29))
-        || euler_rk2_2_w32_out(d2_z, (INT32_C(1) << 29))) {
+        || euler_rk2_2_w32_out(d2_z, (INT32_C(1) << 29))
+        || euler_rk2_2_w32_out(e_x, INT32_C(1140850688))
+        || euler_rk2_2_w32_out(e_y, INT32_C(1140850688))
+        || euler_rk2_2_w32_out(e_z, INT32_C(1140850688))
+        || euler_rk2_2_w32_out(e_s, INT32_C(1140850688))) {
         return 1;
     }
-    /* the angle increment of the whole step */
-    const int32_t sigma_x = d1_x + d2_x; /* Q-1.32, -0.25 .. 0.25, exact */
     const int32_t sigma_y = d1_y + d2_y; /* Q-1.32, -0.25 .. 0.25, exact */
     const int32_t sigma_z = d1_z + d2_z; /* Q-1.32, -0.25 .. 0.25, exact */
     const int64_t sigma_cross_d1_x = euler_rk2_2_w32_mul(d1_z, sigma_y)
-        - euler_rk2_2_w32_mul(d1_y, sigma_z); /* Q-1.64, -0.0313 .. 0.0313, exact */
-    const int64_t sigma_cross_d1_y = euler_rk2_2_w32_mul(d1_x, sigma_z)
-        - euler_rk2_2_w32_mul(d1_z, sigma_x); /* Q-1.64, -0.0313 .. 0.0313, exact */
-    const int64_t sigma_cross_d1_z = euler_rk2_2_w32_mul(d1_y, sigma_x)
-        - euler_rk2_2_w32_mul(d1_x, sigma_y); /* Q-1.64, -0.0313 .. 0.0313, exact */
+        + euler_rk2_2_w32_nml(sigma_z, d1_y); /* Q-1.64, -0.0313 .. 0.0313, exact */
+    /* the angle increment of the whole step */
+    const int32_t sigma_x = d1_x + d2_x; /* Q-1.32, -0.25 .. 0.25, exact */
     /* the step applied to the identity: its vector part */
     const int32_t p_x = sigma_x + euler_rk2_2_w32_fit(-sigma_cross_d1_x
-        + (INT32_C(1) << 30), 31); /* Q-2.33, -0.157 .. 0.157, error 5.9e-11 */
-    const int32_t p_y = sigma_y + euler_rk2_2_w32_fit(-sigma_cross_d1_y
-        + (INT32_C(1) << 30), 31); /* Q-2.33, -0.157 .. 0.157, error 5.9e-11 */
-    const int32_t p_z = sigma_z + euler_rk2_2_w32_fit(-sigma_cross_d1_z
         + (INT32_C(1) << 30), 31); /* Q-2.33, -0.157 .. 0.157, error 5.9e-11 */
     const int64_t d1_dot_d2 = euler_rk2_2_w32_mul(d1_x, d2_x) + euler_rk2_2_w32_mul(d1_y, d2_y)
         + euler_rk2_2_w32_mul(d1_z, d2_z); /* Q-1.64, -0.0469 .. 0.0469, exact */
@@ -121,26 +131,35 @@ int euler_rk2_2_w32(const int32_t state[4], const int32_t increments[6], int32_t
         + euler_rk2_2_w32_sqr(sigma_y) + euler_rk2_2_w32_sqr(sigma_z)
         + (INT32_C(1) << 30), 31); /* Q-2.33, -1.17e-10 .. 0.188, error 5.9e-11 */
     /* its scalar part */
-    const int32_t p_s = euler_rk2_2_w32_fit(euler_rk2_2_w32_mul(sigma_dot_sigma, 3)
-        * (INT32_C(1) << 27) - d1_dot_d2 + (INT32_C(1) << 29), 30);
+    const int32_t p_s = euler_rk2_2_w32_fit(-d1_dot_d2
+        + euler_rk2_2_w32_mul(sigma_dot_sigma, INT32_C(402653184))
+        + (INT32_C(1) << 29), 30);
         /* Q-2.33, -0.0586 .. 0.0938, error 8.1e-11; stores p_s - 1 */
-    /* Euler parameters, body to reference, scalar last, after the step */
-    const int32_t next_s = e_s + euler_rk2_2_w32_fit(euler_rk2_2_w32_mul(e_s, p_s)
-        - euler_rk2_2_w32_mul(e_x, p_x) - euler_rk2_2_w32_mul(e_y, p_y)
-        - euler_rk2_2_w32_mul(e_z, p_z) + (INT64_C(1) << 32), 33);
-        /* Q1.30, -1.67 .. 1.67, error 7.4e-10 */
-    const int32_t next_x = e_x + euler_rk2_2_w32_fit(euler_rk2_2_w32_mul(e_s, p_x)
+    const int64_t sigma_cross_d1_z = euler_rk2_2_w32_mul(d1_y, sigma_x)
+        + euler_rk2_2_w32_nml(sigma_y, d1_x); /* Q-1.64, -0.0313 .. 0.0313, exact */
+    const int32_t p_z = sigma_z + euler_rk2_2_w32_fit(-sigma_cross_d1_z
+        + (INT32_C(1) << 30), 31); /* Q-2.33, -0.157 .. 0.157, error 5.9e-11 */
+    const int64_t sigma_cross_d1_y = euler_rk2_2_w32_mul(d1_x, sigma_z)
+        + euler_rk2_2_w32_nml(sigma_x, d1_z); /* Q-1.64, -0.0313 .. 0.0313, exact */
+    const int32_t p_y = sigma_y + euler_rk2_2_w32_fit(-sigma_cross_d1_y
+        + (INT32_C(1) << 30), 31); /* Q-2.33, -0.157 .. 0.157, error 5.9e-11 */
+    const int32_t next_x = e_x
+        + euler_rk2_2_w32_asr(euler_rk2_2_w32_fit(euler_rk2_2_w32_mul(e_s, p_x)
         + euler_rk2_2_w32_mul(e_x, p_s) + euler_rk2_2_w32_mul(e_y, p_z)
-        - euler_rk2_2_w32_mul(e_z, p_y) + (INT64_C(1) << 32), 33);
-        /* Q1.30, -1.67 .. 1.67, error 7.4e-10 */
-    const int32_t next_y = e_y + euler_rk2_2_w32_fit(euler_rk2_2_w32_mul(e_s, p_y)
-        - euler_rk2_2_w32_mul(e_x, p_z) + euler_rk2_2_w32_mul(e_y, p_s)
-        + euler_rk2_2_w32_mul(e_z, p_x) + (INT64_C(1) << 32), 33);
-        /* Q1.30, -1.67 .. 1.67, error 7.4e-10 */
-    const int32_t next_z = e_z + euler_rk2_2_w32_fit(euler_rk2_2_w32_mul(e_s, p_z)
-        + euler_rk2_2_w32_mul(e_x, p_y) - euler_rk2_2_w32_mul(e_y, p_x)
-        + euler_rk2_2_w32_mul(e_z, p_s) + (INT64_C(1) << 32), 33);
-        /* Q1.30, -1.67 .. 1.67, error 7.4e-10 */
+        + euler_rk2_2_w32_nml(e_z, p_y), 32) + 1, 1); /* Q1.30, -1.67 .. 1.67, error 7.4e-10 */
+    const int32_t next_y = e_y
+        + euler_rk2_2_w32_asr(euler_rk2_2_w32_fit(euler_rk2_2_w32_mul(e_s, p_y)
+        + euler_rk2_2_w32_nml(e_x, p_z) + euler_rk2_2_w32_mul(e_y, p_s)
+        + euler_rk2_2_w32_mul(e_z, p_x), 32) + 1, 1); /* Q1.30, -1.67 .. 1.67, error 7.4e-10 */
+    const int32_t next_z = e_z
+        + euler_rk2_2_w32_asr(euler_rk2_2_w32_fit(euler_rk2_2_w32_mul(e_s, p_z)
+        + euler_rk2_2_w32_mul(e_x, p_y) + euler_rk2_2_w32_nml(e_y, p_x)
+        + euler_rk2_2_w32_mul(e_z, p_s), 32) + 1, 1); /* Q1.30, -1.67 .. 1.67, error 7.4e-10 */
+    /* Euler parameters, body to reference, scalar last, after the step */
+    const int32_t next_s = e_s
+        + euler_rk2_2_w32_asr(euler_rk2_2_w32_fit(euler_rk2_2_w32_mul(e_s, p_s)
+        + euler_rk2_2_w32_nml(e_x, p_x) + euler_rk2_2_w32_nml(e_y, p_y)
+        + euler_rk2_2_w32_nml(e_z, p_z), 32) + 1, 1); /* Q1.30, -1.67 .. 1.67, error 7.4e-10 */
     next[0] = next_x;
     next[1] = next_y;
     next[2] = next_z;

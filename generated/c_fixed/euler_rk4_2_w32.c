@@ -13,7 +13,7 @@
 /* Nonzero if the magnitude of x exceeds the limit. */
 static inline int euler_rk4_2_w32_out(int32_t x, int32_t limit)
 {
-#if defined(__GNUC__) && (defined(__ARM_ARCH_6M__) || defined(__ARM_ARCH_8M_BASE__))
+#if defined(__GNUC__) && defined(__arm__)
     return ((uint32_t)x + (uint32_t)limit) > (2u * (uint32_t)limit); /* fewer instructions there */
 #else
     return (x < -limit) || (x > limit);
@@ -46,6 +46,18 @@ static inline int64_t euler_rk4_2_w32_mul(int32_t a, int32_t b)
 }
 #endif
 
+/* The exact product of two words, times -1. An instruction that accumulates a product takes it
+ * with a negated factor.
+ */
+static inline int64_t euler_rk4_2_w32_nml(int32_t a, int32_t b)
+{
+#if defined(__ARM_ARCH_ISA_THUMB) && (__ARM_ARCH_ISA_THUMB > 1)
+    return euler_rk4_2_w32_mul(a, -b);
+#else
+    return -euler_rk4_2_w32_mul(a, b);
+#endif
+}
+
 /* The exact square of a word. */
 static inline int64_t euler_rk4_2_w32_sqr(int32_t a)
 {
@@ -75,6 +87,27 @@ static inline int32_t euler_rk4_2_w32_fit(int64_t x, int n)
 #endif
 }
 
+/* x / 2^32, to the nearest, where the proof of the ranges shows that it fits into a word: the high
+ * word of x, and one more if the first bit of the low one is set.
+ */
+static inline int32_t euler_rk4_2_w32_near(int64_t x)
+{
+#ifdef __FRAMAC__
+    const int64_t moved = x + INT64_C(2147483648);
+    return (int32_t)((moved < 0) ? ~(~moved >> 32) : (moved >> 32));
+#else
+    const uint32_t carry = (uint32_t)x >> 31;
+    const uint32_t bits = (uint32_t)((uint64_t)x >> 32) + carry;
+    return (bits <= (UINT32_MAX >> 1)) ? (int32_t)bits : (-1 - (int32_t)(UINT32_MAX - bits));
+#endif
+}
+
+/* x / 2^n of a word, rounded down. */
+static inline int32_t euler_rk4_2_w32_asr(int32_t x, int n)
+{
+    return (x >= 0) ? (x >> n) : ~(~x >> n);
+}
+
 /* x / 2^n, rounded down, as a wide number. */
 static inline int64_t euler_rk4_2_w32_shr(int64_t x, int n)
 {
@@ -93,83 +126,86 @@ int euler_rk4_2_w32(const int32_t state[4], const int32_t increments[6], int32_t
     const int32_t d2_x = increments[3];
     const int32_t d2_y = increments[4];
     const int32_t d2_z = increments[5];
-    if (euler_rk4_2_w32_out(e_x, INT32_C(1140850688))
-        || euler_rk4_2_w32_out(e_y, INT32_C(1140850688))
-        || euler_rk4_2_w32_out(e_z, INT32_C(1140850688))
-        || euler_rk4_2_w32_out(e_s, INT32_C(1140850688))
-        || euler_rk4_2_w32_out(d1_x, (INT32_C(1) << 29))
+    if (euler_rk4_2_w32_out(d1_x, (INT32_C(1) << 29))
         || euler_rk4_2_w32_out(d1_y, (INT32_C(1) << 29))
         || euler_rk4_2_w32_out(d1_z, (INT32_C(1) << 29))
         || euler_rk4_2_w32_out(d2_x, (INT32_C(1) << 29))
         || euler_rk4_2_w32_out(d2_y, (INT32_C(1) << 29))
-        || euler_rk4_2_w32_out(d2_z, (INT32_C(1) << 29))) {
+        || euler_rk4_2_w32_out(d2_z, (INT32_C(1) << 29))
+        || euler_rk4_2_w32_out(e_x, INT32_C(1140850688))
+        || euler_rk4_2_w32_out(e_y, INT32_C(1140850688))
+        || euler_rk4_2_w32_out(e_z, INT32_C(1140850688))
+        || euler_rk4_2_w32_out(e_s, INT32_C(1140850688))) {
         return 1;
     }
     /* the angle increment of the whole step */
     const int32_t sigma_x = d1_x + d2_x; /* Q-1.32, -0.25 .. 0.25, exact */
     const int32_t sigma_y = d1_y + d2_y; /* Q-1.32, -0.25 .. 0.25, exact */
     const int32_t sigma_z = d1_z + d2_z; /* Q-1.32, -0.25 .. 0.25, exact */
-    const int32_t sigma_cross_d1_x = euler_rk4_2_w32_fit(euler_rk4_2_w32_mul(d1_z, sigma_y)
-        - euler_rk4_2_w32_mul(d1_y, sigma_z) + (INT32_C(1) << 28), 29);
-        /* Q-4.35, -0.0313 .. 0.0313, error 1.5e-11 */
-    const int32_t sigma_cross_d1_y = euler_rk4_2_w32_fit(euler_rk4_2_w32_mul(d1_x, sigma_z)
-        - euler_rk4_2_w32_mul(d1_z, sigma_x) + (INT32_C(1) << 28), 29);
-        /* Q-4.35, -0.0313 .. 0.0313, error 1.5e-11 */
-    const int32_t sigma_cross_d1_z = euler_rk4_2_w32_fit(euler_rk4_2_w32_mul(d1_y, sigma_x)
-        - euler_rk4_2_w32_mul(d1_x, sigma_y) + (INT32_C(1) << 28), 29);
-        /* Q-4.35, -0.0313 .. 0.0313, error 1.5e-11 */
     const int32_t sigma_dot_sigma = euler_rk4_2_w32_fit(euler_rk4_2_w32_sqr(sigma_x)
         + euler_rk4_2_w32_sqr(sigma_y) + euler_rk4_2_w32_sqr(sigma_z)
         + (INT32_C(1) << 30), 31); /* Q-2.33, -1.17e-10 .. 0.188, error 5.9e-11 */
     /* weight of sigma in p */
-    const int32_t p_sigma = euler_rk4_2_w32_fit(-euler_rk4_2_w32_mul(sigma_dot_sigma,
-        INT32_C(1431655765) /* 1/48 in Q36 */) + (INT32_C(1) << 30), 31);
+    const int32_t p_sigma = euler_rk4_2_w32_fit(euler_rk4_2_w32_mul(sigma_dot_sigma,
+        (-INT32_C(1431655765)) /* -1/48 in Q36 */) + (INT32_C(1) << 30), 31);
         /* Q-7.38, -0.00391 .. 7.28e-12, error 4e-12; stores p_sigma - 1/2 */
+    const int32_t p_sigma_cross_d1_part = euler_rk4_2_w32_asr(p_sigma + (INT16_C(1) << 5), 6);
+        /* Q-1.32, -0.00391 .. 2.33e-10, error 1.3e-10 */
     /* weight of sigma_cross_d1 in p */
-    const int32_t p_sigma_cross_d1 = euler_rk4_2_w32_fit(-(int64_t)p_sigma * (INT32_C(1) << 22)
-        - INT64_C(384307168202282325) /* 1/3 in Q60 */ + (INT32_C(1) << 27), 28);
-        /* Q-1.32, -0.334 .. -0.329, error 1.3e-10 */
+    const int32_t p_sigma_cross_d1 = -p_sigma_cross_d1_part
+        - INT32_C(1431655765) /* 1/3 in Q32 */; /* Q-1.32, -0.334 .. -0.329, error 2e-10 */
+    const int32_t sigma_cross_d1_x = euler_rk4_2_w32_fit(euler_rk4_2_w32_mul(d1_z, sigma_y)
+        + euler_rk4_2_w32_nml(sigma_z, d1_y) + (INT32_C(1) << 28), 29);
+        /* Q-4.35, -0.0313 .. 0.0313, error 1.5e-11 */
     /* the step applied to the identity: its vector part */
-    const int32_t p_x = sigma_x
-        + euler_rk4_2_w32_fit(euler_rk4_2_w32_shr(euler_rk4_2_w32_mul(p_sigma, sigma_x), 1)
-        + euler_rk4_2_w32_mul(p_sigma_cross_d1, sigma_cross_d1_x) * 4
-        + (INT64_C(1) << 35), 36); /* Q-2.33, -0.137 .. 0.137, error 6.8e-11 */
-    const int32_t p_y = sigma_y
-        + euler_rk4_2_w32_fit(euler_rk4_2_w32_shr(euler_rk4_2_w32_mul(p_sigma, sigma_y), 1)
-        + euler_rk4_2_w32_mul(p_sigma_cross_d1, sigma_cross_d1_y) * 4
-        + (INT64_C(1) << 35), 36); /* Q-2.33, -0.137 .. 0.137, error 6.8e-11 */
-    const int32_t p_z = sigma_z
-        + euler_rk4_2_w32_fit(euler_rk4_2_w32_shr(euler_rk4_2_w32_mul(p_sigma, sigma_z), 1)
-        + euler_rk4_2_w32_mul(p_sigma_cross_d1, sigma_cross_d1_z) * 4
-        + (INT64_C(1) << 35), 36); /* Q-2.33, -0.137 .. 0.137, error 6.8e-11 */
+    const int32_t p_x = sigma_x + euler_rk4_2_w32_asr(euler_rk4_2_w32_fit(euler_rk4_2_w32_shr(
+        euler_rk4_2_w32_mul(p_sigma, sigma_x), 3)
+        + euler_rk4_2_w32_mul(p_sigma_cross_d1, sigma_cross_d1_x), 32) + 2, 2);
+        /* Q-2.33, -0.137 .. 0.137, error 7.1e-11 */
     const int32_t d1_dot_d2 = euler_rk4_2_w32_fit(euler_rk4_2_w32_mul(d1_x, d2_x)
-        + euler_rk4_2_w32_mul(d1_y, d2_y) + euler_rk4_2_w32_mul(d1_z, d2_z)
-        + (INT32_C(1) << 28), 29); /* Q-4.35, -0.0469 .. 0.0469, error 1.5e-11 */
-    const int32_t p_s_factor = euler_rk4_2_w32_fit(euler_rk4_2_w32_mul(d1_dot_d2,
-        INT32_C(1431655765) /* 1/24 in Q35 */)
-        - (int64_t)sigma_dot_sigma * (INT32_C(1) << 30) + (INT64_C(1) << 34), 35);
-        /* Q-4.35, -0.00196 .. 0.00123, error 1.7e-11; stores p_s_factor + 1/8 */
+        + euler_rk4_2_w32_mul(d1_y, d2_y) + euler_rk4_2_w32_mul(d1_z, d2_z), 29);
+        /* Q-4.35, -0.0469 .. 0.0469, error 3e-11 */
+    const int32_t p_s_factor_part = euler_rk4_2_w32_asr(sigma_dot_sigma + (INT16_C(1) << 4), 5);
+        /* Q-4.35, -2.92e-11 .. 0.00147, error 1.6e-11 */
+    const int32_t p_s_factor = -p_s_factor_part
+        + euler_rk4_2_w32_near(euler_rk4_2_w32_mul(d1_dot_d2,
+        INT32_C(178956971) /* 1/24 in Q32 */));
+        /* Q-4.35, -0.00196 .. 0.00123, error 3.5e-11; stores p_s_factor + 1/8 */
     /* its scalar part */
-    const int32_t p_s = euler_rk4_2_w32_fit(-(int64_t)sigma_dot_sigma * (INT64_C(1) << 32)
-        + euler_rk4_2_w32_mul(p_s_factor, sigma_dot_sigma) + (INT64_C(1) << 34), 35);
-        /* Q-2.33, -0.0239 .. 0.000229, error 6.9e-11; stores p_s - 1 */
-    /* Euler parameters, body to reference, scalar last, after the step */
-    const int32_t next_s = e_s + euler_rk4_2_w32_fit(euler_rk4_2_w32_mul(e_s, p_s)
-        - euler_rk4_2_w32_mul(e_x, p_x) - euler_rk4_2_w32_mul(e_y, p_y)
-        - euler_rk4_2_w32_mul(e_z, p_z) + (INT64_C(1) << 32), 33);
-        /* Q1.30, -1.53 .. 1.53, error 7.6e-10 */
-    const int32_t next_x = e_x + euler_rk4_2_w32_fit(euler_rk4_2_w32_mul(e_s, p_x)
+    const int32_t p_s = euler_rk4_2_w32_asr(euler_rk4_2_w32_fit(euler_rk4_2_w32_mul(p_s_factor,
+        sigma_dot_sigma), 32) - sigma_dot_sigma + 4, 3);
+        /* Q-2.33, -0.0239 .. 0.000229, error 7.3e-11; stores p_s - 1 */
+    const int32_t sigma_cross_d1_z = euler_rk4_2_w32_fit(euler_rk4_2_w32_mul(d1_y, sigma_x)
+        + euler_rk4_2_w32_nml(sigma_y, d1_x) + (INT32_C(1) << 28), 29);
+        /* Q-4.35, -0.0313 .. 0.0313, error 1.5e-11 */
+    const int32_t p_z = sigma_z + euler_rk4_2_w32_asr(euler_rk4_2_w32_fit(euler_rk4_2_w32_shr(
+        euler_rk4_2_w32_mul(p_sigma, sigma_z), 3)
+        + euler_rk4_2_w32_mul(p_sigma_cross_d1, sigma_cross_d1_z), 32) + 2, 2);
+        /* Q-2.33, -0.137 .. 0.137, error 7.1e-11 */
+    const int32_t sigma_cross_d1_y = euler_rk4_2_w32_fit(euler_rk4_2_w32_mul(d1_x, sigma_z)
+        + euler_rk4_2_w32_nml(sigma_x, d1_z) + (INT32_C(1) << 28), 29);
+        /* Q-4.35, -0.0313 .. 0.0313, error 1.5e-11 */
+    const int32_t p_y = sigma_y + euler_rk4_2_w32_asr(euler_rk4_2_w32_fit(euler_rk4_2_w32_shr(
+        euler_rk4_2_w32_mul(p_sigma, sigma_y), 3)
+        + euler_rk4_2_w32_mul(p_sigma_cross_d1, sigma_cross_d1_y), 32) + 2, 2);
+        /* Q-2.33, -0.137 .. 0.137, error 7.1e-11 */
+    const int32_t next_x = e_x
+        + euler_rk4_2_w32_asr(euler_rk4_2_w32_fit(euler_rk4_2_w32_mul(e_s, p_x)
         + euler_rk4_2_w32_mul(e_x, p_s) + euler_rk4_2_w32_mul(e_y, p_z)
-        - euler_rk4_2_w32_mul(e_z, p_y) + (INT64_C(1) << 32), 33);
-        /* Q1.30, -1.53 .. 1.53, error 7.6e-10 */
-    const int32_t next_y = e_y + euler_rk4_2_w32_fit(euler_rk4_2_w32_mul(e_s, p_y)
-        - euler_rk4_2_w32_mul(e_x, p_z) + euler_rk4_2_w32_mul(e_y, p_s)
-        + euler_rk4_2_w32_mul(e_z, p_x) + (INT64_C(1) << 32), 33);
-        /* Q1.30, -1.53 .. 1.53, error 7.6e-10 */
-    const int32_t next_z = e_z + euler_rk4_2_w32_fit(euler_rk4_2_w32_mul(e_s, p_z)
-        + euler_rk4_2_w32_mul(e_x, p_y) - euler_rk4_2_w32_mul(e_y, p_x)
-        + euler_rk4_2_w32_mul(e_z, p_s) + (INT64_C(1) << 32), 33);
-        /* Q1.30, -1.53 .. 1.53, error 7.6e-10 */
+        + euler_rk4_2_w32_nml(e_z, p_y), 32) + 1, 1); /* Q1.30, -1.53 .. 1.53, error 7.7e-10 */
+    const int32_t next_y = e_y
+        + euler_rk4_2_w32_asr(euler_rk4_2_w32_fit(euler_rk4_2_w32_mul(e_s, p_y)
+        + euler_rk4_2_w32_nml(e_x, p_z) + euler_rk4_2_w32_mul(e_y, p_s)
+        + euler_rk4_2_w32_mul(e_z, p_x), 32) + 1, 1); /* Q1.30, -1.53 .. 1.53, error 7.7e-10 */
+    const int32_t next_z = e_z
+        + euler_rk4_2_w32_asr(euler_rk4_2_w32_fit(euler_rk4_2_w32_mul(e_s, p_z)
+        + euler_rk4_2_w32_mul(e_x, p_y) + euler_rk4_2_w32_nml(e_y, p_x)
+        + euler_rk4_2_w32_mul(e_z, p_s), 32) + 1, 1); /* Q1.30, -1.53 .. 1.53, error 7.7e-10 */
+    /* Euler parameters, body to reference, scalar last, after the step */
+    const int32_t next_s = e_s
+        + euler_rk4_2_w32_asr(euler_rk4_2_w32_fit(euler_rk4_2_w32_mul(e_s, p_s)
+        + euler_rk4_2_w32_nml(e_x, p_x) + euler_rk4_2_w32_nml(e_y, p_y)
+        + euler_rk4_2_w32_nml(e_z, p_z), 32) + 1, 1); /* Q1.30, -1.53 .. 1.53, error 7.7e-10 */
     next[0] = next_x;
     next[1] = next_y;
     next[2] = next_z;

@@ -12,7 +12,7 @@
 /* Nonzero if the magnitude of x exceeds the limit. */
 static inline int sculling_fast_2_w32_out(int32_t x, int32_t limit)
 {
-#if defined(__GNUC__) && (defined(__ARM_ARCH_6M__) || defined(__ARM_ARCH_8M_BASE__))
+#if defined(__GNUC__) && defined(__arm__)
     return ((uint32_t)x + (uint32_t)limit) > (2u * (uint32_t)limit); /* fewer instructions there */
 #else
     return (x < -limit) || (x > limit);
@@ -45,6 +45,18 @@ static inline int64_t sculling_fast_2_w32_mul(int32_t a, int32_t b)
 }
 #endif
 
+/* The exact product of two words, times -1. An instruction that accumulates a product takes it
+ * with a negated factor.
+ */
+static inline int64_t sculling_fast_2_w32_nml(int32_t a, int32_t b)
+{
+#if defined(__ARM_ARCH_ISA_THUMB) && (__ARM_ARCH_ISA_THUMB > 1)
+    return sculling_fast_2_w32_mul(a, -b);
+#else
+    return -sculling_fast_2_w32_mul(a, b);
+#endif
+}
+
 /* x / 2^n, rounded down, where the proof of the ranges shows that it fits into a word: then the
  * 32 bits of x from bit n on, read as a number with a sign, are that quotient. For n above 32 the
  * high word of x is shifted on. Nothing is left to the compiler: no right shift of a negative
@@ -62,6 +74,12 @@ static inline int32_t sculling_fast_2_w32_fit(int64_t x, int n)
                                                  : (-1 - (int32_t)(UINT32_MAX - bits));
     return (high < 0) ? ~(~high >> beyond) : (high >> beyond);
 #endif
+}
+
+/* x / 2^n of a word, rounded down. */
+static inline int32_t sculling_fast_2_w32_asr(int32_t x, int n)
+{
+    return (x >= 0) ? (x >> n) : ~(~x >> n);
 }
 
 int sculling_fast_2_w32(const int32_t angle_sum[3], const int32_t velocity_sum[3],
@@ -83,52 +101,52 @@ int sculling_fast_2_w32(const int32_t angle_sum[3], const int32_t velocity_sum[3
     const int32_t dv_x = velocity_increment[0];
     const int32_t dv_y = velocity_increment[1];
     const int32_t dv_z = velocity_increment[2];
-    if (sculling_fast_2_w32_out(beta_x, (INT32_C(1) << 30))
-        || sculling_fast_2_w32_out(beta_y, (INT32_C(1) << 30))
-        || sculling_fast_2_w32_out(beta_z, (INT32_C(1) << 30))
-        || sculling_fast_2_w32_out(u_x, (INT32_C(1) << 30))
-        || sculling_fast_2_w32_out(u_y, (INT32_C(1) << 30))
-        || sculling_fast_2_w32_out(u_z, (INT32_C(1) << 30))
-        || sculling_fast_2_w32_out(eta_x, (INT32_C(1) << 30))
-        || sculling_fast_2_w32_out(eta_y, (INT32_C(1) << 30))
-        || sculling_fast_2_w32_out(eta_z, (INT32_C(1) << 30))
+    if (sculling_fast_2_w32_out(dv_x, (INT32_C(1) << 30))
+        || sculling_fast_2_w32_out(dv_y, (INT32_C(1) << 30))
+        || sculling_fast_2_w32_out(dv_z, (INT32_C(1) << 30))
         || sculling_fast_2_w32_out(d_x, (INT32_C(1) << 30))
         || sculling_fast_2_w32_out(d_y, (INT32_C(1) << 30))
         || sculling_fast_2_w32_out(d_z, (INT32_C(1) << 30))
-        || sculling_fast_2_w32_out(dv_x, (INT32_C(1) << 30))
-        || sculling_fast_2_w32_out(dv_y, (INT32_C(1) << 30))
-        || sculling_fast_2_w32_out(dv_z, (INT32_C(1) << 30))) {
+        || sculling_fast_2_w32_out(eta_x, (INT32_C(1) << 30))
+        || sculling_fast_2_w32_out(eta_y, (INT32_C(1) << 30))
+        || sculling_fast_2_w32_out(eta_z, (INT32_C(1) << 30))
+        || sculling_fast_2_w32_out(u_x, (INT32_C(1) << 30))
+        || sculling_fast_2_w32_out(u_y, (INT32_C(1) << 30))
+        || sculling_fast_2_w32_out(u_z, (INT32_C(1) << 30))
+        || sculling_fast_2_w32_out(beta_x, (INT32_C(1) << 30))
+        || sculling_fast_2_w32_out(beta_y, (INT32_C(1) << 30))
+        || sculling_fast_2_w32_out(beta_z, (INT32_C(1) << 30))) {
         return 1;
     }
     /* sum of the angle increments since the slow cycle began, after the call */
-    const int32_t next_beta_x = beta_x + sculling_fast_2_w32_fit((int64_t)d_x + 4, 3);
+    const int32_t next_beta_x = beta_x + sculling_fast_2_w32_asr(d_x + 4, 3);
         /* Q1.30, -1.13 .. 1.13, error 4.7e-10 */
-    const int32_t next_beta_y = beta_y + sculling_fast_2_w32_fit((int64_t)d_y + 4, 3);
+    const int32_t next_beta_y = beta_y + sculling_fast_2_w32_asr(d_y + 4, 3);
         /* Q1.30, -1.13 .. 1.13, error 4.7e-10 */
-    const int32_t next_beta_z = beta_z + sculling_fast_2_w32_fit((int64_t)d_z + 4, 3);
+    const int32_t next_beta_z = beta_z + sculling_fast_2_w32_asr(d_z + 4, 3);
         /* Q1.30, -1.13 .. 1.13, error 4.7e-10 */
     /* sum of the velocity increments since the slow cycle began, after the call */
-    const int32_t next_u_x = u_x + sculling_fast_2_w32_fit((int64_t)dv_x + 4, 3);
+    const int32_t next_u_x = u_x + sculling_fast_2_w32_asr(dv_x + 4, 3);
         /* Q4.27, -9.01 .. 9.01, error 3.8e-09 */
-    const int32_t next_u_y = u_y + sculling_fast_2_w32_fit((int64_t)dv_y + 4, 3);
+    const int32_t next_u_y = u_y + sculling_fast_2_w32_asr(dv_y + 4, 3);
         /* Q4.27, -9.01 .. 9.01, error 3.8e-09 */
-    const int32_t next_u_z = u_z + sculling_fast_2_w32_fit((int64_t)dv_z + 4, 3);
+    const int32_t next_u_z = u_z + sculling_fast_2_w32_asr(dv_z + 4, 3);
         /* Q4.27, -9.01 .. 9.01, error 3.8e-09 */
     /* sculling integral since the slow cycle began, after the call */
     const int32_t next_eta_x = eta_x
-        + sculling_fast_2_w32_fit(sculling_fast_2_w32_mul(beta_y, dv_z)
-        - sculling_fast_2_w32_mul(beta_z, dv_y) - sculling_fast_2_w32_mul(d_y, u_z)
-        + sculling_fast_2_w32_mul(d_z, u_y) + (INT64_C(1) << 32), 33);
+        + sculling_fast_2_w32_asr(sculling_fast_2_w32_fit(sculling_fast_2_w32_mul(beta_y,
+        dv_z) + sculling_fast_2_w32_nml(dv_y, beta_z) + sculling_fast_2_w32_nml(u_z, d_y)
+        + sculling_fast_2_w32_mul(d_z, u_y), 32) + 1, 1);
         /* Q3.28, -6.01 .. 6.01, error 1.9e-09 */
     const int32_t next_eta_y = eta_y
-        + sculling_fast_2_w32_fit(sculling_fast_2_w32_mul(beta_z, dv_x)
-        - sculling_fast_2_w32_mul(beta_x, dv_z) + sculling_fast_2_w32_mul(d_x, u_z)
-        - sculling_fast_2_w32_mul(d_z, u_x) + (INT64_C(1) << 32), 33);
+        + sculling_fast_2_w32_asr(sculling_fast_2_w32_fit(sculling_fast_2_w32_mul(beta_z,
+        dv_x) + sculling_fast_2_w32_nml(dv_z, beta_x) + sculling_fast_2_w32_mul(d_x, u_z)
+        + sculling_fast_2_w32_nml(u_x, d_z), 32) + 1, 1);
         /* Q3.28, -6.01 .. 6.01, error 1.9e-09 */
     const int32_t next_eta_z = eta_z
-        + sculling_fast_2_w32_fit(sculling_fast_2_w32_mul(beta_x, dv_y)
-        - sculling_fast_2_w32_mul(beta_y, dv_x) - sculling_fast_2_w32_mul(d_x, u_y)
-        + sculling_fast_2_w32_mul(d_y, u_x) + (INT64_C(1) << 32), 33);
+        + sculling_fast_2_w32_asr(sculling_fast_2_w32_fit(sculling_fast_2_w32_mul(beta_x,
+        dv_y) + sculling_fast_2_w32_nml(dv_x, beta_y) + sculling_fast_2_w32_nml(u_y, d_x)
+        + sculling_fast_2_w32_mul(d_y, u_x), 32) + 1, 1);
         /* Q3.28, -6.01 .. 6.01, error 1.9e-09 */
     next_angle_sum[0] = next_beta_x;
     next_angle_sum[1] = next_beta_y;

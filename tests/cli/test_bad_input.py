@@ -121,6 +121,9 @@ BAD = {
     "simulate euler --method": "--method needs a value, NAME: integration method; strapgen list methods shows all",
     "simulate euler --method --increments 2": "--method needs a value, NAME: integration method",
     "simulate euler --method rk2,rk4": "--method rk2,rk4 is a list; one name is needed here",
+    f"simulate euler {CONSTANT} --order scam": "order 'scam' is not known (did you mean scan?)",
+    f"simulate euler {CONSTANT} --order scan": "order is scan; it goes with the back ends c and c-float, not with",
+    f"simulate two-speed-euler --order scan {CONSTANT}": "--order",
     f"simulate euler --backend c,numpy {CONSTANT}": "--backend c,numpy is a list; one name is needed here",
     f"simulate euler {CONSTANT} --plot -": "--plot - is no file",
     # Names that other people use

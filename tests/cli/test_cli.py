@@ -605,6 +605,17 @@ def test_simulate_prints_matrices_every_so_often_under_a_title(strapgen_says):
         np.testing.assert_allclose(printed, wanted, rtol=1e-4, atol=6e-10)
 
 
+def test_simulate_multiplies_the_steps_in_another_order(strapgen_says):
+    words = "simulate euler --backend c --motion coning --set a_deg_s=10 b_deg_s=10 g_deg_s=10 --step 0.01"
+    command = f"{words} --duration 10 --record 10 --format json"
+    by_steps, by_scan = (json.loads(strapgen_says(command + order)) for order in ("", " --order scan"))
+    assert "order" not in by_steps
+    assert by_scan["order"] == "scan"
+    assert by_steps["drift_deg"] != by_scan["drift_deg"]
+    np.testing.assert_allclose(by_scan["drift_deg"], by_steps["drift_deg"], atol=1e-11)
+    assert json.loads(strapgen_says(f"{command} --order sequential")) == by_steps
+
+
 def test_simulate_begins_at_an_attitude(strapgen_says):
     command = f"simulate euler --method rk2 {CONING} --record 5 --format json --matrices"
     turned, plain = (json.loads(strapgen_says(command + more)) for more in (" --initial-deg 10,-20,30", ""))

@@ -110,14 +110,14 @@ def test_every_value_has_a_name_in_capitals():
 
 
 def test_one_option_has_one_metavar_and_one_beginning_of_its_sentence():
-    """A list of values has an ellipsis; files and folders differ."""
+    """A list of values has an ellipsis; files and folders differ, and the order of a method and of a run's steps."""
     metavars = defaultdict(set)
     for command in EVERY.values():
         for parameter in command.params:
             if parameter.opts[0].startswith("--") and not parameter.is_flag:
                 metavars[parameter.opts[0]].add(parameter.metavar.removesuffix(",..."))
     several = {option: names for option, names in metavars.items() if len(names) > 1}
-    assert several == {"--out": {"FILE", "FOLDER"}}
+    assert several == {"--out": {"FILE", "FOLDER"}, "--order": {"N", "ORDER"}}
 
 
 def test_no_option_is_declared_in_the_plural():

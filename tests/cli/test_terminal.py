@@ -4,6 +4,7 @@ import io
 import re
 import shlex
 import sys
+import threading
 import time
 
 import pytest
@@ -113,13 +114,28 @@ def test_quiet_shows_no_progress(stream, monkeypatch):
 
 
 def test_where_no_terminal_is_progress_is_in_lines(monkeypatch):
-    now = iter([0, 4, 11, 12, 21, 40])
-    monkeypatch.setattr(progress.time, "monotonic", lambda: next(now))
     monkeypatch.setattr(sys, "stderr", stream := io.StringIO())
-    items = progress.track("abcd", "running", 4)
-    monkeypatch.setattr(progress, "_BETWEEN_LINES", 10)
-    assert list(items) == ["a", "b", "c", "d"]
-    assert stream.getvalue() == "running: 2 of 4\n"
+    monkeypatch.setattr(progress, "_BETWEEN_LINES", 0.02)
+    items = progress.track("ab", "running", 2)
+    assert next(items) == "a"
+    while stream.getvalue().count("\n") < 2:  # during a step too, however long it takes
+        time.sleep(0.01)
+    assert set(stream.getvalue().splitlines()) == {"running: 0 of 2"}
+    assert next(items) == "b"
+    while "running: 1 of 2" not in stream.getvalue():
+        time.sleep(0.01)
+    assert list(items) == []
+
+
+def test_progress_in_lines_ends_with_an_error(monkeypatch):
+    monkeypatch.setattr(sys, "stderr", io.StringIO())
+    monkeypatch.setattr(progress, "_BETWEEN_LINES", 0.02)
+    before = threading.active_count()
+    items = progress.track((1 / number for number in (1, 0)), "running", 2)
+    assert next(items) == 1
+    with pytest.raises(ZeroDivisionError):
+        next(items)
+    assert threading.active_count() == before
 
 
 def test_where_no_terminal_is_a_task_says_its_seconds_in_lines(monkeypatch):

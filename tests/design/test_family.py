@@ -147,3 +147,24 @@ def test_titles_name_the_purpose_of_filters():
     assert replace(SMALL, gyro=GYRO, noise=Fraction(1, 100), spectrum=()).full_title == (
         "Window 1+2+2 to 1 rad, gyro 40 Hz, noise 0.01, for a spectrum"
     )
+
+
+def test_a_second_design_takes_its_filters_from_the_cache(monkeypatch):
+    brief = FamilyBrief(2, 2, Fraction(1), degree=2)
+    first = design(brief)
+    asked = []
+
+    def designed(*of: object) -> tuple[()]:
+        asked.append(of)
+        raise InputError("designed again")
+
+    monkeypatch.setattr(family, "_designed", designed)
+    again = design(replace(brief, title="By another name"))
+    assert [again.filters, *(one.filters for one in again.one_sided)] == [
+        first.filters,
+        *(one.filters for one in first.one_sided),
+    ]
+    assert not asked
+    for other in (replace(brief, band=Fraction(3, 2)), replace(brief, one_sided_noise=Fraction(1, 100))):
+        with pytest.raises(InputError, match="designed again"):
+            design(other)

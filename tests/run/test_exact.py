@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+import pickle
 import subprocess
 import sys
 from fractions import Fraction
 
+import mpmath
 import numpy as np
 import pytest
 from derived import program
 
 import strapgen
-from strapgen.catalogue import Choice
+from strapgen.catalogue import Choice, choose
 from strapgen.ir.exceptions import InputTypeError
 from strapgen.run import exact
 
@@ -94,3 +96,46 @@ def test_sources_with_text_are_refused():
         InputTypeError, match="sources of euler-rk4-2 for numpy hold text; a program is needed"
     ):
         exact.ExactEvaluator(strapgen.backend("euler").sources)
+
+
+#: Sums and products, divisions and roots, choices, functions, and a step.
+INTERPRETED = ("euler-product", "euler-normalize", "euler-from-dcm", "euler-angles-from-dcm", "coning-truth")
+
+
+@pytest.mark.parametrize("digits", [15, exact.DIGITS, 61])
+@pytest.mark.parametrize("kernel", INTERPRETED)
+def test_integers_have_the_bits_of_mpmath(kernel, digits, rng):
+    program = strapgen.pipeline.program(choose(kernel))
+    with mpmath.workdps(digits):
+        interpreter = exact.Interpreter(program)
+        for scale in (1e-30, 1e-3, 1.0, 1e9):
+            inputs = [
+                [mpmath.mpf(x) * scale / 3 for x in rng.normal(size=signal.size).tolist()]
+                for signal in program.inputs
+            ]
+            inputs[0][0] *= 0  # a zero has no bits
+            elements = [name for signal in program.inputs for name in signal.elements]
+            values = dict(zip(elements, (x for each in inputs for x in each), strict=True))
+            wanted = program.run(values, exact.number, exact._OPERATIONS)
+            assert interpreter._on_integers(values) == wanted
+            assert interpreter.outputs(*inputs) == wanted
+
+
+def test_halves_are_rounded_to_the_even_number():
+    with mpmath.workprec(4):
+        product = exact.Interpreter(strapgen.pipeline.program(choose("euler-product")))
+        one = [mpmath.mpf(x) for x in (0, 0, 0, 1)]
+        # Of 5 and of 6 bits, half-way between two numbers of 4; 39 is no half.
+        for value, nearest in ((17, 16), (19, 20), (-17, -16), (-19, -20), (34, 32), (38, 40), (39, 40)):
+            many = mpmath.mp.make_mpf(mpmath.libmp.from_man_exp(value, 0))
+            (state,) = product.outputs([many, *one[:2], one[2]], one).values()
+            assert state == [nearest, 0, 0, 0]
+
+
+def test_numbers_beyond_all_bounds_are_those_of_mpmath():
+    normalize = exact.Interpreter(strapgen.pipeline.program(choose("euler-normalize")))
+    with mpmath.workdps(exact.DIGITS):
+        assert all(map(mpmath.isnan, normalize([mpmath.inf, *[mpmath.mpf(0)] * 3])[:1]))
+        with pytest.raises(ZeroDivisionError):
+            normalize([mpmath.mpf(0)] * 4)
+        assert float(pickle.loads(pickle.dumps(normalize))([mpmath.mpf(2), *[mpmath.mpf(0)] * 3])[0]) == 1

@@ -15,6 +15,7 @@ import time
 from pathlib import Path
 
 import pytest
+import sympy
 
 from strapgen import pipeline
 from strapgen.catalogue import choose
@@ -599,3 +600,15 @@ def test_a_planted_library_is_not_loaded(root, tmp_path, when, monkeypatch, warn
     assert len(warnings.messages) == (when == "before")
     ctypes.CDLL(str(planted_library))
     assert marker.exists(), "the planted library does what was looked for"
+
+
+def test_generator_digest_sees_the_version_of_sympy(monkeypatch, tmp_path):
+    before = cache._release_of_sympy()
+    assert sympy.__version__.encode() in before
+    other = tmp_path / "sympy"
+    other.mkdir()
+    (other / "__init__.py").touch()
+    monkeypatch.syspath_prepend(tmp_path)
+    assert cache._release_of_sympy() == sympy.__version__.encode()  # of a package that has no such file
+    (other / "release.py").write_text('__version__ = "99"\n')
+    assert cache._release_of_sympy() == b'__version__ = "99"\n'

@@ -299,13 +299,14 @@ class Propagation:
         initial: np.ndarray | bool | None = True,
         history: np.ndarray | bool | None = True,
         function: Any = None,
+        loop: str = "_propagate",
     ) -> tuple[int, np.ndarray]:
         null, pointer = self.library.ffi.NULL, self.library.pointer
         start = np.tile(self.identity, (runs, 1)) if initial is True else initial
         records = 1 + steps // record_every if record_every else 1
         memory = np.full((runs * records + 2, self.size), 7.0, self.dtype)
         inside = memory[1:-1]
-        status = self.library.function(self.sources, "_propagate")(
+        status = self.library.function(self.sources, loop)(
             runs,
             steps,
             record_every,
@@ -362,7 +363,10 @@ def test_the_stack_that_a_loop_is_said_to_use_holds_the_largest_of_its_arrays(st
     assert abreast * number_bytes == 64
     states = size * abreast * number_bytes
     prepared = 2 * number(r"_wide_prepared_ prepared\[2\]\[(\d+)\];") * lanes * number_bytes
-    assert int(re.search(r"Uses about (\d+) bytes of stack", header)[1]) == max(states, prepared)
+    stated = [int(number) for number in re.findall(r"Uses about\s(?: \* )?(\d+) bytes of stack", header)]
+    # A scan holds the products and the records of a block, and the states before its lanes.
+    block = (2 * 8 * 16 + 8) * size * number_bytes
+    assert stated == [max(states, prepared), *([block] if has_scan(sources) else [])]
     # Memory is fetched as far ahead as whole steps of samples lie within 512 bytes.
     step_bytes = sources.function.inputs[-1].size * number_bytes
     assert 0 <= 512 - fetched * step_bytes < step_bytes
@@ -400,24 +404,64 @@ def test_several_steps_of_one_run_are_prepared_in_vectors(compiler, target, fold
     assert not re.search(r"\bmuls[sd]\b", body)
 
 
-@pytest.mark.parametrize("absent", ["defined(__GNUC__)", "defined(__STRICT_ANSI__)"])
+#: What other compilers and processors lack: the extensions of GNU, the AVX-512 of strict C, AVX-512, and AVX2 too.
+ABSENT = [
+    r"defined\(__GNUC__\)",
+    r"defined\(__STRICT_ANSI__\)",
+    r'__builtin_cpu_supports\("avx512f"\)',
+    r'__builtin_cpu_supports\(".*?"\)',
+]
+
+
+def has_scan(sources: Sources) -> bool:
+    """Return whether there is a scan beside the loop; there is none where a transition holds constants."""
+    return f"{sources.function.name}_scan(" in sources.files[sources.runs[0]]
+
+
+@pytest.mark.parametrize("target", TARGETS)
+def test_steps_whose_transitions_are_complete_have_a_scan(target):
+    assert [has_scan(generated(step, target)) for step in STEPS] == [False, True, True]
+
+
+@pytest.mark.parametrize("absent", ABSENT)
 def test_loops_for_other_compilers_and_processors_have_the_same_bits(absent, tmp_path, propagate, rng):
     sources = propagate.sources
-    assert absent in sources.files[sources.runs[1]]
+    assert re.search(absent, sources.files[sources.runs[1]])
     for name, text in sources.files.items():
-        (tmp_path / name).write_text(text.replace(absent, "0"))
+        (tmp_path / name).write_text(re.sub(absent, "0", text))
     names = [name for name in sources.files if name.endswith(".c")]
     command = [needed("gcc"), *C_FLAGS, *STRICT, "-shared", "-fPIC", *names, "-o", "plain.so", "-lm"]
     subprocess.run(command, cwd=tmp_path, check=True)
-    plain = ctypes.CDLL(str(tmp_path / "plain.so"))[f"{sources.function.name}_propagate"]
+    plain, name = ctypes.CDLL(str(tmp_path / "plain.so")), sources.function.name
+
+    def call(function: str, *arguments: Any) -> int:
+        return plain[name + function](
+            *(
+                ctypes.c_void_p(one.ctypes.data) if isinstance(one, np.ndarray) else ctypes.c_size_t(one)
+                for one in arguments
+            )
+        )
+
     runs, steps = 37, 5
     increments = rng.normal(scale=0.05, size=(runs, steps, 6)).astype(propagate.dtype)
     initial = np.tile(propagate.identity, (runs, 1))
     history = np.empty((runs, 1 + steps, propagate.size), propagate.dtype)
-    counts = [ctypes.c_size_t(count) for count in (runs, steps, 1, 0)]
-    pointers = [ctypes.c_void_p(array.ctypes.data) for array in (initial, increments, history)]
-    assert plain(*counts, None, *pointers) == 0
+    assert call("_propagate", runs, steps, 1, 0, 0, initial, increments, history) == 0
     assert propagate(increments, runs=runs, steps=steps)[1].tobytes() == history.tobytes()
+    # A batch is ordered by element.
+    by_element = [np.ascontiguousarray(rows.T) for rows in (history[:, 1], increments[:, 1])]
+    after = np.empty_like(by_element[0])
+    call("_batch", runs, *by_element, after)
+    assert after.T.tobytes() == history[:, 2].tobytes()
+    if not has_scan(sources):
+        return
+    steps = 300
+    increments = rng.normal(scale=0.05, size=(steps, 6)).astype(propagate.dtype)
+    history = np.empty((1 + steps, propagate.size), propagate.dtype)
+    assert call("_scan", 1, steps, 1, 0, 0, initial, increments, history) == 0
+    assert propagate(increments, steps=steps, loop="_scan")[1].tobytes() == history.tobytes()
+    # Blocks of a scan are of another order than steps one by one.
+    assert propagate(increments, steps=steps)[1].tobytes() != history.tobytes()
 
 
 @pytest.mark.parametrize("runs", [0, 1, 7, 64])
@@ -480,9 +524,10 @@ def test_steps_after_the_last_record_are_run_and_not_recorded(propagate):
     ids=lambda fault: next(iter(fault)),
 )
 def test_bad_arguments_give_status_1_and_leave_the_history_alone(propagate, fault):
-    status, history = propagate(**{"increments": propagate.increments[0]} | fault)
-    assert status == 1
-    assert (history == 7.0).all()
+    for loop in ["_propagate", *(["_scan"] if has_scan(propagate.sources) else [])]:
+        status, history = propagate(**{"increments": propagate.increments[0]} | fault, loop=loop)
+        assert status == 1
+        assert (history == 7.0).all()
 
 
 # Operation counts

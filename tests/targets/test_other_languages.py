@@ -21,7 +21,7 @@ from strapgen.run.backends import of_sources
 from strapgen.run.evaluators import Evaluator
 from strapgen.targets.contract_lines import Contract
 from strapgen.targets.cpp import constants
-from strapgen.targets.names import Naming
+from strapgen.targets.naming import Naming
 from strapgen.targets.rendering import Macro
 from strapgen.targets.rust import _RUST_WORDS, _RustStatementPrinter, module_name
 

@@ -12,8 +12,9 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any, Protocol, TypeAlias
 
 from strapgen.catalogue.methods.method_spec import MethodSpec
+from strapgen.catalogue.methods.tableaux import TITLES
 from strapgen.catalogue.methods.window import Window
-from strapgen.catalogue.names import INTEGRATORS, KERNELS, LAYOUT_KERNELS, named_method
+from strapgen.catalogue.names import ALGORITHMS, INTEGRATORS, KERNELS, LAYOUT_KERNELS, named_method
 from strapgen.ir import checks
 from strapgen.ir.checks import shown
 from strapgen.ir.exceptions import InputTypeError
@@ -139,8 +140,9 @@ class Choice:
 
     def _code_of_packages(self) -> Iterator[str]:
         """Yield hashes of the code of installed packages that derives the kernel."""
-        yield KERNELS.code(self.name) or LAYOUT_KERNELS.code(self.name)
-        if self.method is not None:
+        if self.name not in ALGORITHMS:
+            yield KERNELS.code(self.name) or LAYOUT_KERNELS.code(self.name)
+        if self.method is not None and self.method not in TITLES.own:
             yield INTEGRATORS.code(str(self.method))
 
     @property

@@ -102,9 +102,10 @@ def choose(
         return name
     name = os.fspath(name)
     asked = RequestedSamples(increments, rates, previous, ahead)
-    if name.endswith(".py") or (name not in reserved() and name in loading.installed()):
+    takes_method = name in ALGORITHMS or name in VECTORS  # asked first: others need what is installed
+    if name.endswith(".py") or (not takes_method and name not in reserved() and name in loading.installed()):
         choice = _choose_users(name, method, asked)
-    elif name in ALGORITHMS or name in VECTORS:
+    elif takes_method:
         choice = _choose_method(name, method, asked)
     else:
         if name not in reserved():
@@ -123,7 +124,7 @@ def choose(
                 takers = ", ".join([*ALGORITHMS, *VECTORS])
                 raise InputError(f"kernel {name} takes no {option} (got {value}); these do: {takers}")
         choice = Choice(name)
-    if layout is not None or name in LAYOUT_KERNELS:
+    if layout is not None or (not takes_method and name in LAYOUT_KERNELS):
         choice = _with_layout(choice, layout)
     return choice if constants is None else _with_constants(choice, constants)
 

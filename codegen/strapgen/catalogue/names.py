@@ -95,7 +95,8 @@ def named_method(method: str | MethodSpec) -> MethodSpec | None:
 def is_built_in(method: str) -> bool:
     """Return whether a name is not that of an installed package's coefficient file."""
     name = method.removesuffix(EXACT)
-    return not any(name in table and name not in table.own for table in (TITLES, SHAPE_TITLES, WINDOW_TITLES))
+    tables = (TITLES, SHAPE_TITLES, WINDOW_TITLES)
+    return any(name in table.own for table in tables) or not any(name in table for table in tables)
 
 
 #: Integration methods. Each family of windows has others for the same samples, such as window-8-6 beside window-7-7.

@@ -211,15 +211,15 @@ class FixedOptions:
 
     def check_increments(self, choice: Choice) -> None:
         """Refuse a largest rate or angle for a kernel that takes neither."""
-        from strapgen import pipeline
-        from strapgen.fixedpoint.sensor_scale import counted
-        from strapgen.ir.fixed_settings import ROTATION_INPUTS
-
         options = {*stated(self)}
         of_gyro = options & {"--sample-hz", "--lsb", "--lsb-rad", "--input-bits"}
         of_angle = options & {"--max-rate-deg-s", "--step", "--max-angle-rad"}
         if not of_gyro and not of_angle:
             return
+        from strapgen import pipeline
+        from strapgen.fixedpoint.sensor_scale import counted
+        from strapgen.ir.fixed_settings import ROTATION_INPUTS
+
         program = pipeline.program(choice)
         if of_gyro and not counted(program):
             raise InputError(

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from strapgen.ir.fixed_settings import Settings
     from strapgen.ir.sources import Sources
     from strapgen.run.kernel_sources import Request
-    from strapgen.targets.names import Naming
+    from strapgen.targets.naming import Naming
 
 
 def _folder_or_terminal(option: str, path: Path) -> Path:
@@ -93,7 +93,7 @@ class SourceOptions:
     @property
     def naming(self) -> Naming:
         """The name that the options choose."""
-        from strapgen.targets.names import Naming
+        from strapgen.targets.naming import Naming
 
         return Naming(self.name, self.prefix, self.variant)
 

@@ -13,7 +13,6 @@ from strapgen.ir.signals import CYCLE, after
 from strapgen.ir.sources import Sources
 from strapgen.results.records import INTERNAL, entry
 from strapgen.results.result import Result
-from strapgen.targets.contract import argument_text
 
 if TYPE_CHECKING:
     from strapgen.catalogue import Choice
@@ -34,6 +33,8 @@ def contract(sources: Sources) -> Iterator[str]:
 
 
 def _fixed(interface: Interface) -> Iterator[str]:
+    from strapgen.targets.contract import argument_text
+
     states = {argument.signal.name for argument in interface.outputs}
     for argument in interface.inputs:
         if argument.signal.over == CYCLE and after(argument.signal).name not in states:

@@ -10,7 +10,7 @@ import dataclasses
 import shlex
 from collections.abc import Callable, Mapping, Sequence, Sized
 from copy import copy
-from functools import wraps
+from functools import partial, wraps
 from inspect import Parameter, Signature
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple, TypeVar, get_type_hints
@@ -42,6 +42,29 @@ VARIANT = Parameter(
         ),
     ],
 )
+
+
+def read_words(command: Any, context: Any) -> None:
+    """Let the parameters of a command take what needs no conversion: no value, a switch, and words that `Option` reads.
+
+    Typer converts each by a library whose import takes longer than the rest of a short command.
+    """
+    words = str if isinstance(getattr(command.callback, "options", None), CommandOptions) else bool
+    for parameter in command.get_params(context):
+        kind = bool if getattr(parameter, "is_flag", False) else words
+        vars(parameter)["process_value"] = partial(_process, parameter, kind)
+
+
+def _process(parameter: Any, kind: type, context: Any, value: Any) -> Any:
+    """Return a value, or a list of several, if it is of a kind; else what Typer makes of it."""
+    several = parameter.multiple or parameter.nargs == -1
+    if several and value is not None:
+        value = list(value)
+    is_kind = all(isinstance(one, kind) for one in (value if several and value else [value]))
+    if (value is None or value == [] or is_kind) and not (parameter.required and not value):
+        value = () if several and value is None else value
+        return value if parameter.callback is None else parameter.callback(context, parameter, value)
+    return type(parameter).process_value(parameter, context, value)
 
 
 def grouped(command: Command) -> Command:
@@ -102,6 +125,8 @@ class Option(NamedTuple):
         """Return the typed value of a word; None stands for none, as no words do."""
         if word is None or word == []:
             return None
+        if self.kind is Path:
+            word = values.path(self.spelling, word)
         return word if self.read is None else self.read(self.spelling, word)
 
 

@@ -15,7 +15,7 @@ from typer.core import TyperCommand, TyperGroup
 from strapgen import registration
 from strapgen.cli import completion, help_layout, terminal
 from strapgen.cli.help_layout import CommandHelp, lay_out, summary
-from strapgen.cli.option_groups import CommandOptions
+from strapgen.cli.option_groups import CommandOptions, read_words
 from strapgen.ir.checks import alternatives, suggestions
 from strapgen.ir.exceptions import InputError, StrapgenError
 from strapgen.registration import Command
@@ -30,6 +30,7 @@ class PlainCommand(TyperCommand):
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """Read the command line; an option's name is not the value of the option before it."""
+        read_words(self, ctx)
         if not ctx.resilient_parsing:  # else a shell completes the line
             _refuse_missing_values(self, ctx, args)
             _refuse_second_values(self, ctx, args)
@@ -57,6 +58,11 @@ class PlainCommand(TyperCommand):
 
 class PlainGroup(TyperGroup):
     """A group of commands, which its help lists."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Read the words before the name of a command."""
+        read_words(self, ctx)
+        return list(super().parse_args(ctx, args))
 
     def listed(self) -> dict[str, dict[str, str]]:
         """Return the commands with their summaries, by heading."""

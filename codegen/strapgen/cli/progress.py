@@ -5,8 +5,8 @@ from __future__ import annotations
 import sys
 import threading
 import time
-from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TypeVar
 
@@ -33,45 +33,59 @@ def track(items: Iterable[Item], title: str, total: int) -> Iterator[Item]:
 
 
 def _in_lines(items: Iterable[Item], title: str, total: int) -> Iterator[Item]:
-    last = time.monotonic()
-    for done, item in enumerate(items, 1):
-        yield item
-        if time.monotonic() - last >= _BETWEEN_LINES and done < total:
-            terminal.remark(f"{title}: {done} of {total}")
-            last = time.monotonic()
+    done = 0
+    stream = sys.stderr
+    with _repeating(lambda: stream.write(f"{title}: {done} of {total}\n"), _BETWEEN_LINES, _BETWEEN_LINES):
+        for item in items:
+            yield item
+            done += 1
+
+
+@contextmanager
+def _repeating(say: Callable[[], object], first: float, interval: float) -> Iterator[None]:
+    """Say something after some seconds and again and again, from another thread, however long a step takes."""
+    done, stream = threading.Event(), sys.stderr
+
+    def run() -> None:
+        wait = first
+        while not done.wait(wait):
+            with suppress(OSError, ValueError):  # whoever reads it has gone
+                say()
+                stream.flush()
+            wait = interval
+
+    saying = threading.Thread(target=run, daemon=True)
+    saying.start()
+    try:
+        yield
+    finally:
+        done.set()
+        saying.join()
 
 
 @contextmanager
 def waiting(title: str) -> Iterator[None]:
     """Show the seconds that a task has taken, once it takes more than one; where no terminal is, every ten."""
-    stream = sys.stderr
+    stream, begin = sys.stderr, time.monotonic()
     if terminal.is_quiet():
         yield
         return
-    done, begin = threading.Event(), time.monotonic()
-    on_terminal = stream.isatty()
-    first, interval = (_PATIENCE, _INTERVAL) if on_terminal else (_BETWEEN_LINES, _BETWEEN_LINES)
+    on_terminal, is_shown = stream.isatty(), False
 
-    def show() -> None:
-        if done.wait(first):
-            return
-        while True:
-            text = f"{title} {time.monotonic() - begin:.0f} s"
-            stream.write(f"{_WIPE}{text}" if on_terminal else f"{text}\n")
-            stream.flush()
-            if done.wait(interval):
-                break
-        if on_terminal:
+    def say() -> None:
+        nonlocal is_shown
+        is_shown = on_terminal
+        text = f"{title} {time.monotonic() - begin:.0f} s"
+        stream.write(f"{_WIPE}{text}" if on_terminal else f"{text}\n")
+
+    times = (_PATIENCE, _INTERVAL) if on_terminal else (_BETWEEN_LINES, _BETWEEN_LINES)
+    try:
+        with _repeating(say, *times):
+            yield
+    finally:
+        if is_shown:
             stream.write(_WIPE)
             stream.flush()
-
-    shown = threading.Thread(target=show, daemon=True)
-    shown.start()
-    try:
-        yield
-    finally:
-        done.set()
-        shown.join()
 
 
 def say_unused(file: Path, unused: int, of_step: int, step: str = "step") -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from fractions import Fraction
@@ -110,6 +111,13 @@ def whole(smallest: int, largest: int | None = None) -> Reader:
     )
 
 
+def path(option: str, word: str | Path) -> Path:
+    """Return the path of a word; what is there can be read."""
+    if os.access(word, os.F_OK) and not os.access(word, os.R_OK):
+        raise InputError(f"{option} {word} cannot be read; its permissions are in the way")
+    return Path(word)
+
+
 def folder(option: str, path: Path) -> Path:
     """Return a folder; elsewhere - stands for the terminal."""
     if path == streams.STANDARD:
@@ -132,7 +140,7 @@ def reader(kind: Any, read: Reader | None) -> Reader | None:
     whole_kind, parts = split(kind)
     if whole_kind is tuple:
         return _tuple_reader(
-            parts, read or reader(parts[0], None) or (_path if parts[0] is Path else _as_it_is)
+            parts, read or reader(parts[0], None) or (path if parts[0] is Path else _as_it_is)
         )
     if issubclass(whole_kind, Mapping):
         return _pairs_reader(read or reader(parts[1], None) or _as_it_is)
@@ -142,10 +150,6 @@ def reader(kind: Any, read: Reader | None) -> Reader | None:
         return whole_kind.read  # type: ignore[no-any-return]
     readers: dict[Any, Reader] = {int: checks.whole, Fraction: checks.number}
     return readers.get(whole_kind)
-
-
-def _path(option: str, text: str) -> Path:
-    return Path(text)
 
 
 def _as_it_is(option: str, text: str) -> str:

@@ -94,8 +94,9 @@ def design(
     brief = read_brief(file)
     several = contenders(brief, methods)
     rows = track(judgements(file, several, results, count, cluster), "judging", len(several))
+    judged = in_order(one for row in rows for one in row)
     with waiting("running the answer"):
-        ordered = confirm(brief, file, in_order(one for row in rows for one in row))
+        ordered = confirm(brief, file, judged)
     runs = None if simulate is None else _simulate(brief, file, ordered[:simulate], count)
     result = SelectionResult(brief, ordered, runs, file.stem)
     if generate is not None:

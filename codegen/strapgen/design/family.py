@@ -21,7 +21,8 @@ from strapgen.design.filters import exchange, mean_square, responses
 from strapgen.design.filters.filter_taps import Shape, Unknowns, rounded
 from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError
-from strapgen.ir.notebook_display import short_repr
+from strapgen.ir.notebook_display import full_text, short_repr
+from strapgen.storage import cache
 
 #: Default of the noise for which one-sided filters are designed.
 ONE_SIDED_NOISE = Fraction(3, 10000)
@@ -71,6 +72,8 @@ class FamilyBrief:
     >>> brief = FamilyBrief(previous=2, ahead=2, band=Fraction(1))
     >>> brief.objective, brief.full_title
     ('minimax', 'Window 1+2+2 to 1 rad')
+    >>> FamilyBrief(8, 8, Fraction(13, 10), taps=(8, 6)).full_title
+    'Pair 1+8+8 of 8/6 taps to 1.3 rad'
     """
 
     previous: int
@@ -238,7 +241,13 @@ def _sibling(committed: Window, size: tuple[int, int], filters: tuple[Taps, ...]
 
 
 def _filters(brief: FamilyBrief, size: tuple[int, int], one_sided_noise: Fraction) -> tuple[Taps, ...]:
-    """Return the filters with some samples before and ahead of the step, as rationals."""
+    """Return the filters with some samples before and ahead of the step, as rationals, from the cache if there."""
+    key = full_text((replace(brief, title=""), size, one_sided_noise))
+    return cache.stored("filters", [key], lambda: _designed(brief, size, one_sided_noise))
+
+
+def _designed(brief: FamilyBrief, size: tuple[int, int], one_sided_noise: Fraction) -> tuple[Taps, ...]:
+    """Design the filters with some samples before and ahead of the step."""
     shape = Shape(*size, brief.conditions, brief.gyro, brief.increments)
     degrees = range(0 if brief.gyro else 1, brief.degree + 1)
     one_sided = size != (brief.previous, brief.ahead)

@@ -31,7 +31,7 @@ from strapgen.navigation.systems.fitting import fitted
 from strapgen.navigation.systems.wiring import Description
 from strapgen.results.records import entry
 from strapgen.run.processes import end_with_parent
-from strapgen.targets.names import UNNAMED, Naming
+from strapgen.targets.naming import UNNAMED, Naming
 
 #: The kernel of the examinations that take long.
 REFERENCE_STEP = "euler-rk4-2"

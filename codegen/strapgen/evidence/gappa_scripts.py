@@ -151,7 +151,7 @@ class _FixedScriptWriter:
     """Writes the script of a program in fixed point."""
 
     def __init__(self, fixed: FixedProgram) -> None:
-        self.script, self.nearest = Script(), fixed.interface.settings.rounding == "nearest"
+        self.script, self.rounding = Script(), fixed.interface.settings.rounding
         self.fractions: dict[str, int] = {}
         self.limits: dict[str, tuple[Fraction, Fraction]] = {}
         self.expansions: dict[str, polynomials.Polynomial] = {}
@@ -252,7 +252,8 @@ class _FixedScriptWriter:
         """Return the fine terms of a sum before rounding, and the terms added to them."""
         name, feedback = value.name, definition.residual
         if feedback is None:
-            return f"s_{name}", [number(Fraction(2) ** (-value.fraction - 1))] if self.nearest else []
+            half = definition.half(self.rounding) * Fraction(2) ** (-value.fraction - definition.shift)
+            return f"s_{name}", [number(half)] if half else []
         place, before, text = value.fraction + definition.shift, f"s_{name}", f"c_{feedback.name}"
         if definition.drop:
             before = f"d_{name}"
@@ -329,7 +330,7 @@ class _FixedScriptWriter:
         name, fraction = value.name, value.fraction
         top, exact_top = self._scale(numerator, fraction + self.fractions[denominator])
         below, exact_below = f"c_{denominator}", self._exact(denominator)
-        mode = "na" if self.nearest else "zr"  # of magnitudes, the sign comes last
+        mode = "na" if self.rounding == "nearest" else "zr"  # of magnitudes, the sign comes last
         self.script.define(f"s_{name}", f"{top} / {below}")
         self.script.define(f"c_{name}", f"fixed<{-fraction},{mode}>(s_{name})")
         self.script.define(f"e_{name}", f"{exact_top} / {exact_below}")
@@ -343,7 +344,9 @@ class _FixedScriptWriter:
     def _root(self, value: Value, argument: Scaled) -> None:
         name, fraction = value.name, value.fraction
         inside, exact_inside = self._scale(argument, 2 * fraction)
-        mode = "ne" if self.nearest else "dn"  # no root of an integer lies halfway between two integers
+        mode = (
+            "ne" if self.rounding == "nearest" else "dn"
+        )  # no root of an integer lies halfway between two integers
         self.script.define(f"c_{name}", f"fixed<{-fraction},{mode}>(sqrt({inside}))")
         self.script.define(f"e_{name}", f"sqrt({exact_inside})")
 

@@ -21,7 +21,7 @@ from strapgen.navigation.two_speed.two_speed_sources import Wiring
 from strapgen.run.kernel_sources import StepSources
 from strapgen.targets.c_numbers import numbers_of, types_of
 from strapgen.targets.contract import options
-from strapgen.targets.names import UNNAMED, Naming
+from strapgen.targets.naming import UNNAMED, Naming
 from strapgen.targets.registry import BUILT_IN
 from strapgen.targets.rendering import render
 

@@ -32,7 +32,7 @@ from strapgen.run.kernel_sources import program_of, sources_of_program
 from strapgen.targets import BUILT_IN
 from strapgen.targets.c import CPrinter, real_of
 from strapgen.targets.contract import options
-from strapgen.targets.names import UNNAMED, Naming
+from strapgen.targets.naming import UNNAMED, Naming
 
 #: The target of the integer model.
 MODEL = "fixed-model"

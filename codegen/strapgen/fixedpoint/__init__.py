@@ -1,5 +1,6 @@
 """`quantize` turns a program into integer code with proved ranges and certified error bounds."""
 
+from contextlib import suppress
 from dataclasses import replace
 
 from strapgen.ir.exceptions import InputError
@@ -25,9 +26,11 @@ def quantize(program: Program, settings: Settings) -> FixedProgram:
     try:
         fixed = lowered(counts, settings)
         series = without_roots(counts, settings)
-        other = fixed if series is counts else lowered(series, settings)
-        if all(other.error_bounds[name] <= error for name, error in fixed.error_bounds.items()):
-            fixed = other
+        if series is not counts:
+            with suppress(InputError):  # a word is too short for it
+                other = lowered(series, settings)
+                if all(other.error_bounds[name] <= error for name, error in fixed.error_bounds.items()):
+                    fixed = other
         return replace(fixed, program=program)
     except InputError:
         raise

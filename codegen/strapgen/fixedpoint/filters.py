@@ -35,7 +35,7 @@ def nearest_word(value: Fraction, word: int) -> Factor:
     >>> nearest_word(Fraction(3, 8), 16), nearest_word(Fraction(1, 3), 8)
     ((3, 3), (85, 8))
     """
-    bits = _bits(value, word)
+    bits = longest(value, word)
     return _short(nearest(value * Fraction(2) ** bits), bits)
 
 
@@ -109,7 +109,7 @@ class _Filter:
 
     def candidates(self) -> Iterator[tuple[Factor, ...]]:
         """Yield the coefficients rounded one by one, and with each two of them changed."""
-        places = [_bits(c, self.word) for c in self.coefficients]
+        places = [longest(c, self.word) for c in self.coefficients]
         yield tuple(_short(self._integer(k, place), place) for k, place in enumerate(places))
         free = [k for k, c in enumerate(self.coefficients) if not is_power_of_two(c)]
         for pair in combinations(free, 2):
@@ -179,7 +179,7 @@ def _shortest(a: int, b: int, total: int) -> tuple[int, int]:
     return x - q * steps, y + p * steps
 
 
-def _bits(value: Fraction, word: int) -> int:
+def longest(value: Fraction, word: int) -> int:
     """Return the most fraction bits with which a word holds a coefficient."""
     return finest(abs(value) * (1 + Fraction(1, 1 << word)), word)
 

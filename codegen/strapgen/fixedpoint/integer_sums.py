@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 
-from strapgen.fixedpoint.filters import Factor, filter_words, nearest_word
+from strapgen.fixedpoint.filters import Factor, filter_words, longest, nearest_word
 from strapgen.fixedpoint.format_plan import FormatPlan, carried_input
 from strapgen.fixedpoint.intervals import Interval
 from strapgen.fixedpoint.quantities import (
@@ -35,8 +36,21 @@ from strapgen.ir.integer_program import Coefficient, IntegerOperation, IntegerSu
 from strapgen.ir.interfaces import ErrorFeedback
 from strapgen.ir.program import Program
 
+#: What a sum may grow by in its roundings, when there is room for it.
+_ROOM = 1 + Fraction(1, 1 << 10)
 #: Part of the smaller end of a checked range that an error may take, so that proper input passes the check.
 _LARGEST_PART = Fraction(1, 2)
+
+
+@dataclass(frozen=True)
+class HighWords:
+    """Choices where sums of products are narrowed by taking their high words."""
+
+    fine: frozenset[str] = frozenset()  # values as fine as their words allow, narrowed by fewer bits
+    kept: frozenset[str] = (
+        frozenset()
+    )  # values not made coarser where products lie at other places: those are shifted
+    down: frozenset[str] = frozenset()  # values rounded down, which takes no instruction
 
 
 @dataclass
@@ -49,11 +63,14 @@ class Quantization:
     plan: FormatPlan
     most: Mapping[str, int]  # most fraction bits of quantities that need not be finer
     feedback_names: Mapping[str, str]  # error feedbacks by the quantity whose rounding error they hand on
+    high: HighWords | None = None  # the choices where sums are narrowed to their high words
     word: int = field(init=False)  # bits
     rounding_error: Fraction = field(init=False)  # largest error of a rounding, in units of the last place
     values: dict[str, Value] = field(init=False)  # the integers so far, those of the inputs included
     body: list[Value] = field(default_factory=list)  # the integers so far, in the order of the code
     resets: set[str] = field(default_factory=set)  # quantities whose computed value is exact from there on
+    #: Fraction bits of factors with which the products of a sum would lie at one place.
+    wanted: dict[str, int] = field(default_factory=dict)
     #: Largest magnitudes in calls that pass the checks.
     checked: dict[str, Fraction] = field(default_factory=dict)
 
@@ -174,9 +191,15 @@ def lower_sum(context: Quantization, quantity: Quantity, definition: Sum) -> Non
 
 def _lower(context: Quantization, quantity: Quantity, definition: Sum) -> Value:
     """Return the integer of a sum."""
-    terms = _integer_terms(context, definition)
     followed = _followed_error(context, quantity)
-    if quantity.name not in context.plan.words:
+    is_word = quantity.name in context.plan.words
+    checked = quantity.range_checked or quantity.name in context.feedback_names
+    if context.high is not None and not checked:
+        if is_word:
+            return _narrowed(context, context.high, quantity, definition, followed)
+        return _unrounded(context, quantity, definition, followed)
+    terms = _integer_terms(context, definition)
+    if not is_word:
         return _wide(context, quantity, terms, followed)
     natural = finest(quantity.range.magnitude, context.word)
     places = [item.place for item in terms]
@@ -189,6 +212,176 @@ def _lower(context: Quantization, quantity: Quantity, definition: Sum) -> Value:
             return _limit(context, quantity, value)
         value = _round(context, quantity, terms, value.fraction - 1, followed)
     return value
+
+
+@dataclass
+class _Gathered:
+    """The terms of a sum by how they can be brought to a place."""
+
+    #: Products, and wide numbers: at the place of their factors.
+    products: list[Placed] = field(default_factory=list)
+    #: Multiples of words, each with the place of its longest coefficient: at any place below that.
+    multiples: list[tuple[Monomial, Fraction, int]] = field(default_factory=list)
+    #: Words times powers of two, which are shifted.
+    shifted: list[tuple[Monomial, Fraction, Placed]] = field(default_factory=list)
+    constant: Fraction = Fraction(0)
+
+
+def _gathered(context: Quantization, definition: Sum) -> _Gathered:
+    """Return the terms of a sum by how they can be brought to a place."""
+    words = filter_words(context.quantities, context.program.inputs, definition, context.word)
+    terms = _Gathered()
+    for monomial, coefficient in definition.terms:
+        if not monomial:
+            terms.constant = coefficient
+        elif len(monomial) == 2 or monomial in words:
+            terms.products.append(_product_term(context, monomial, coefficient, words.get(monomial)))
+        elif is_power_of_two(coefficient):
+            item = _product_term(context, monomial, coefficient)
+            if context.values[monomial[0]].wide:
+                terms.products.append(item)
+            else:
+                terms.shifted.append((monomial, coefficient, item))
+        else:
+            most = context.values[word_of(context, monomial[0])].fraction + longest(coefficient, context.word)
+            terms.multiples.append((monomial, coefficient, most))
+    return terms
+
+
+def _top(context: Quantization, definition: Sum, terms: _Gathered, fraction: int) -> int | None:
+    """Return the place at which a sum of so many fraction bits adds up its products; None where it has none."""
+    tops = [*(item.place for item in terms.products), *(most for *_, most in terms.multiples)]
+    if not tops:
+        return None
+    after = {monomial for monomial, _, item in terms.shifted if item.place <= fraction}
+    sizes = (
+        abs(coefficient) * math.prod((context.size(name) for name in monomial), start=Fraction(1))
+        for monomial, coefficient in definition.terms
+        if monomial and monomial not in after
+    )
+    return min(*tops, finest(sum(sizes, Fraction(0)) * _ROOM, 2 * context.word))
+
+
+def _unrounded(context: Quantization, quantity: Quantity, definition: Sum, followed: Fraction) -> Value:
+    """Return a sum that no word is needed of, with its products at one place."""
+    terms = _gathered(context, definition)
+    top = _top(context, definition, terms, 0)
+    placed = [*terms.products, *(item for *_, item in terms.shifted)]
+    if top is None:
+        return _wide(context, quantity, _integer_terms(context, definition), followed)
+    top = min(top, context.most.get(quantity.name, top))
+    _note_wanted(context, terms.products, top)
+    placed += [_multiple(context, monomial, c, top) for monomial, c, _ in terms.multiples]
+    if terms.constant:
+        placed.append(_constant_at(terms.constant, top))
+    return _wide(context, quantity, placed, followed, top)
+
+
+def _constant_at(constant: Fraction, place: int) -> Placed:
+    """Return a constant as an integer term at a place."""
+    integer = nearest(constant * Fraction(2) ** place)
+    wrong = abs(integer / Fraction(2) ** place - constant)
+    return Placed(Term((), integer, coefficient=Coefficient(constant, place)), place, up(wrong))
+
+
+def _narrowed(
+    context: Quantization, high: HighWords, quantity: Quantity, definition: Sum, followed: Fraction
+) -> Value:
+    """Return the integer of a sum whose products lie at one place, a word above that of the result."""
+    name, word, forced = quantity.name, context.word, quantity.name in context.plan.forced
+    terms = _gathered(context, definition)
+    natural = finest(quantity.range.magnitude, word)
+    fraction = context.plan.forced.get(name, min(natural, context.most.get(name, natural)))
+    top = _top(context, definition, terms, fraction)
+    if top is not None and name not in high.fine:
+        fraction = min(fraction, top - word)
+    elif top is None and (not terms.constant or is_dyadic(terms.constant)):
+        fraction = min(fraction, max([item.place for *_, item in terms.shifted] or [fraction]))
+    fraction = context.plan.forced.get(name, fraction)
+    products = list(terms.products)
+    if top is not None:
+        if not products:
+            top = min(top, fraction + word)
+        _note_wanted(context, products, top)
+        products += [_multiple(context, monomial, c, top) for monomial, c, _ in terms.multiples]
+    down = name in high.down
+    before = len(context.body)
+    while True:
+        # The place of the high word, to which words are added before it is shifted on.
+        high_place = fraction if top is None else max(fraction, top - word)
+        placed = list(products)
+        for monomial, coefficient, item in terms.shifted:
+            apart = item.place > high_place
+            placed.append(
+                _part(context, high, quantity, item, (monomial, coefficient), high_place) if apart else item
+            )
+        if terms.constant:
+            exact = (terms.constant * Fraction(2) ** fraction).denominator == 1
+            placed.append(_constant_at(terms.constant, fraction if exact else high_place))
+        value = _round(context, quantity, placed, fraction, followed, top, down)
+        if value.magnitude <= context.largest(fraction):
+            return value
+        if forced:
+            return _limit(context, quantity, value)
+        fraction -= 1
+        for part in context.body[before:]:
+            del context.values[part.name]
+        del context.body[before:]
+
+
+def _note_wanted(context: Quantization, products: Sequence[Placed], top: int) -> None:
+    """Note by how much factors would be coarser if the products that lie below a place lay at it."""
+    for item in products:
+        names = {*item.term.names}
+        free = [name for name in names if _is_rounded(context.values[name]) and not _is_kept(context, name)]
+        if item.place > top and free and len(names) == len(item.term.names):
+            name = max(free, key=[*context.values].index)  # the last of them, on which no other depends
+            wanted = context.values[name].fraction - (item.place - top)
+            context.wanted[name] = min(wanted, context.wanted.get(name, wanted))
+
+
+def _is_kept(context: Quantization, name: str) -> bool:
+    """Return whether a quantity keeps its format: its products are shifted where others lie at another place."""
+    return name in context.plan.forced or (context.high is not None and name in context.high.kept)
+
+
+def _is_rounded(value: Value) -> bool:
+    """Return whether a value is an inexact sum, which may be coarser."""
+    return isinstance(value.definition, IntegerSum) and bool(value.error)
+
+
+def _multiple(context: Quantization, monomial: Monomial, coefficient: Fraction, top: int) -> Placed:
+    """Return a multiple of a value as a term at a place, or with the longest coefficient where that is above it."""
+    value = context.values[word_of(context, monomial[0])]
+    bits = min(top - value.fraction, longest(coefficient, context.word))
+    factor = nearest(coefficient * Fraction(2) ** bits)
+    if not factor:
+        return _product_term(context, monomial, coefficient)
+    return _product_term(context, monomial, coefficient, (factor, bits))
+
+
+def _part(
+    context: Quantization,
+    high: HighWords,
+    quantity: Quantity,
+    item: Placed,
+    term: tuple[Monomial, Fraction],
+    fraction: int,
+) -> Placed:
+    """Return a term that is a shifted value as one narrowed by itself, which is added to the high word."""
+    (factor,), coefficient = term
+    inside = context.quantities.items[factor].range.scale(abs(coefficient))
+    name = next(
+        name
+        for number in itertools.count(1)
+        if (name := f"{quantity.name}_part{'' if number == 1 else f'_{number}'}") not in context.values
+        and name not in context.quantities.items
+    )
+    part = Quantity(name, quantity.definition, Fraction(0), inside)
+    shifted = replace(item, term=replace(item.term, factor=1))
+    value = _round(context, part, [shifted], fraction, down=name in high.down)
+    context.add(value)
+    return Placed(Term((name,), item.term.factor), fraction, value.error)
 
 
 def _note_squares(context: Quantization, quantity: Quantity, definition: Sum) -> bool:
@@ -290,9 +483,7 @@ def _constant_term(constant: Fraction, places: Sequence[int], word: int) -> Plac
     else:
         place = max([*places, finest(abs(constant), longest)])
     place = min(place, longest - math.ceil(abs(constant)).bit_length())
-    integer = nearest(constant * Fraction(2) ** place)
-    wrong = abs(integer / Fraction(2) ** place - constant)
-    return Placed(Term((), integer, coefficient=Coefficient(constant, place)), place, up(wrong))
+    return _constant_at(constant, place)
 
 
 # Rounding
@@ -314,9 +505,15 @@ class _FineTerms:
         return self.aligned.peak + self.added
 
 
-def _wide(context: Quantization, quantity: Quantity, terms: Sequence[Placed], followed: Fraction) -> Value:
-    """Return a sum at full precision, which is only added, compared, or the argument of a root."""
-    fraction = max((item.place for item in terms), default=context.word - 1)
+def _wide(
+    context: Quantization,
+    quantity: Quantity,
+    terms: Sequence[Placed],
+    followed: Fraction,
+    top: int | None = None,
+) -> Value:
+    """Return a sum at full precision or at a place, which is only added, compared, or the argument of a root."""
+    fraction = max((item.place for item in terms), default=context.word - 1) if top is None else top
     while True:
         total = aligned(terms, fraction, context.word, context.values)
         if total.fits(context.word, context.values):
@@ -332,8 +529,13 @@ def _round(
     terms: Sequence[Placed],
     fraction: int,
     followed: Fraction = Fraction(0),
+    top: int | None = None,
+    down: bool = False,
 ) -> Value:
-    """Return a sum as a word of so many fraction bits."""
+    """Return a sum as a word of so many fraction bits.
+
+    `top` is the place at which what is rounded is added up, by default the finest; `down` rounds it down.
+    """
     word, values = context.word, context.values
     fine_terms = [item for item in terms if item.place > fraction]
     coarse = aligned([item for item in terms if item.place <= fraction], fraction, word, values)
@@ -345,7 +547,7 @@ def _round(
         return integer_value(
             context, quantity, definition, fraction, coarse.error, coarse.peak, followed=followed
         )
-    fine = _fine(context, quantity.name, fine_terms, fraction)
+    fine = _fine(context, quantity.name, fine_terms, fraction, top, down)
     rounded_peak = (fine.peak >> fine.shift) + 1
     if not coarse.fits(word, values, rounded_peak) or fine.peak > largest_wide(word):
         raise context.too_short(quantity.name)
@@ -353,7 +555,8 @@ def _round(
     drop = max(0, fraction + fine.shift - feedback.fraction) if feedback is not None else 0
     # With error feedback, the result is off by what was left before and what is left now.
     roundings = 2 if feedback is not None else 1
-    error = fine.error + coarse.error + roundings * context.rounding_error / Fraction(2) ** fraction
+    rounding_error = Fraction(1) if down else context.rounding_error
+    error = fine.error + coarse.error + roundings * rounding_error / Fraction(2) ** fraction
     value = integer_value(
         context,
         quantity,
@@ -364,6 +567,7 @@ def _round(
             feedback,
             drop,
             in_words=coarse.peak + rounded_peak <= largest_word,
+            down=down,
         ),
         fraction,
         error,
@@ -375,12 +579,20 @@ def _round(
     return value
 
 
-def _fine(context: Quantization, name: str, terms: Sequence[Placed], fraction: int) -> _FineTerms:
-    """Return the terms that are rounded at the finest place at which they have room."""
+def _fine(
+    context: Quantization,
+    name: str,
+    terms: Sequence[Placed],
+    fraction: int,
+    top: int | None = None,
+    down: bool = False,
+) -> _FineTerms:
+    """Return the terms that are rounded at the finest place at which they have room, or from `top` on."""
     word, values = context.word, context.values
-    rounds_to_nearest = context.settings.rounding == "nearest"
+    rounds_to_nearest = context.settings.rounding == "nearest" and not down
+    first = max(item.place for item in terms)
     feedback_name = context.feedback_names.get(name)
-    for place in range(max(item.place for item in terms), fraction, -1):
+    for place in range(first if top is None else max(min(first, top), fraction + 1), fraction, -1):
         shift = place - fraction
         total = aligned(terms, place, word, values)
         error, feedback = total.error, None

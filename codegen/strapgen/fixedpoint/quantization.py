@@ -18,7 +18,8 @@ from strapgen.fixedpoint.format_plan import (
     limits,
     sums_of_inputs_are_exact,
 )
-from strapgen.fixedpoint.integer_sums import Quantization, integer_value, lower_sum, word_of
+from strapgen.fixedpoint.high_words import high_words, in_order, with_exact_parts_apart
+from strapgen.fixedpoint.integer_sums import HighWords, Quantization, integer_value, lower_sum, word_of
 from strapgen.fixedpoint.intervals import Interval
 from strapgen.fixedpoint.quantities import (
     ExactOperation,
@@ -50,6 +51,8 @@ from strapgen.ir.signals import CYCLE, Signal
 
 #: Shorter formats are chosen where they cost no more than a hundredth in error.
 _WORSE = Fraction(101, 100)
+#: High words are taken where they cost no more than a sixtieth in error.
+_NARROWED = Fraction(61, 60)
 
 
 def lowered(program: Program, settings: Settings) -> FixedProgram:
@@ -62,6 +65,12 @@ def lowered(program: Program, settings: Settings) -> FixedProgram:
     aligned = _fixed_program(shorter)
     if not _is_worse(aligned, fixed):
         context, fixed = shorter, aligned
+    if not settings.digits:
+        narrowed = _high_words(program, settings, quantities, plan, context)
+        if narrowed is not None:
+            program_of = _fixed_program(narrowed)
+            if sum(program_of.operations.values()) < sum(fixed.operations.values()):
+                context, fixed = narrowed, program_of
     if program.attitude_step is None or program.transition is None:
         return fixed
     (result,) = fixed.interface.outputs
@@ -74,6 +83,34 @@ def lowered(program: Program, settings: Settings) -> FixedProgram:
         angle_accumulation=angle_accumulation(context, program.transition, errors),
     )
     return replace(fixed, interface=interface)
+
+
+def _high_words(
+    program: Program, settings: Settings, quantities: Quantities, plan: FormatPlan, other: Quantization
+) -> Quantization | None:
+    """Return a walk that narrows sums to their high words, where that costs no more than a hundredth in error."""
+    if other.resets:
+        return None
+    results = {
+        signal: [name for name in names if isinstance(name, str)]
+        for signal, names in quantities.results.items()
+    }
+    outputs = [name for result in program.outputs for name in results[result.signal.name]]
+    transition = [] if program.transition is None else results[program.transition.signal.name]
+    # Where the rounding of the state comes back in the next call, what adds up is the error of the transition.
+    limited = outputs if settings.carry == "none" else [*outputs, *transition]
+    limits = {name: other.values[name].error * _NARROWED for name in limited if name in other.values}
+
+    def walk(some: Quantities, most: Mapping[str, int], high: HighWords) -> Quantization:
+        return _walk(program, settings, some, plan, most, high)
+
+    try:
+        narrowed = high_words(walk, with_exact_parts_apart(quantities, plan.words), limits)
+    except (InputError, ArithmeticError):  # a word is too short, or a coarse divisor may be zero
+        return None
+    if narrowed is not None:
+        narrowed.body = in_order(narrowed.body, outputs, transition)
+    return narrowed
 
 
 def _plan(program: Program, settings: Settings) -> tuple[Quantities, FormatPlan]:
@@ -110,11 +147,16 @@ def _splits(program: Program, settings: Settings) -> bool:
 
 
 def _walk(
-    program: Program, settings: Settings, quantities: Quantities, plan: FormatPlan, most: Mapping[str, int]
+    program: Program,
+    settings: Settings,
+    quantities: Quantities,
+    plan: FormatPlan,
+    most: Mapping[str, int],
+    high: HighWords | None = None,
 ) -> Quantization:
     """Lower the quantities one by one, and return the final state of the walk."""
     names = _feedback_names(program, settings, quantities)
-    context = Quantization(program, settings, quantities, plan, most, names)
+    context = Quantization(program, settings, quantities, plan, most, names, high)
     for quantity in quantities.items.values():
         match quantity.definition:
             case Sum() as total if not _is_unused_constant(context, quantity, total):

@@ -140,8 +140,14 @@ def text(what: str, value: Any) -> str:
     return value
 
 
-def real_array(what: str, value: Any, tail: tuple[int, ...], dtype: Any = float) -> NDArray[Any]:
-    """Return `value` as a finite array of `dtype`, in C order, whose last axes have the shape `tail`."""
+def real_array(
+    what: str, value: Any, tail: tuple[int, ...], dtype: Any = float, *, finite: bool = True
+) -> NDArray[Any]:
+    """Return `value` as a finite array of `dtype`, in C order, whose last axes have the shape `tail`.
+
+    An array of that type and order is returned itself, uncopied. With `finite` False `require_finite` is left to the
+    caller.
+    """
     import numpy as np  # imported here, since most commands do not need numpy and start faster without it
 
     if np.ma.isMaskedArray(value):
@@ -150,22 +156,52 @@ def real_array(what: str, value: Any, tail: tuple[int, ...], dtype: Any = float)
         array = np.asarray(value)
     except ValueError:
         raise InputError(f"{what} has rows of different lengths; an array of numbers is needed") from None
-    if array.dtype.kind in "iu":
-        array = array.astype(np.float64)
-    if array.dtype.kind != "f":
+    if array.dtype.kind not in "fiu":
         raise InputTypeError(f"{what} has dtype {array.dtype}; numbers are needed")
     if array.shape[array.ndim - len(tail) :] != tail or array.ndim < len(tail):
         needed = ", ".join(["...", *map(str, tail)])
         raise InputError(f"{what} has shape {array.shape}; ({needed}) is needed")
+    with np.errstate(over="ignore", invalid="ignore"):
+        converted: NDArray[Any] = np.asarray(array, dtype=dtype, order="C")
+    if finite:
+        require_finite(what, array, converted)
+    return converted
+
+
+def require_finite(what: str, value: Any, converted: NDArray[Any]) -> None:
+    """Refuse an array that is not finite; `converted` is the same in the type that is needed."""
+    import numpy as np
+
     # If the sum is finite, so is every term, and it is faster than a test of each; an overflow needs the full test.
     with np.errstate(over="ignore", invalid="ignore"):
-        if not np.isfinite(array.sum()) and not np.isfinite(array).all():
-            worst = tuple(int(i) for i in np.argwhere(~np.isfinite(array))[0])
-            raise InputError(f"{what} holds {array[worst]} at index {worst}; finite numbers are needed")
-        converted: NDArray[Any] = np.asarray(array, dtype=dtype, order="C")
-    if converted.dtype.itemsize < array.dtype.itemsize and not np.isfinite(converted).all():
+        if np.isfinite(converted.sum()) or np.isfinite(converted).all():
+            return
+    array = np.asarray(value)
+    bad = np.argwhere(~np.isfinite(array))
+    if not len(bad):
         raise InputError(f"{what} holds numbers beyond the range of {converted.dtype}")
-    return converted
+    worst = tuple(int(i) for i in bad[0])
+    raise InputError(f"{what} holds {array[worst]} at index {worst}; finite numbers are needed")
+
+
+def output_array(
+    what: str, value: Any, shape: tuple[int, ...], dtype: Any, *inputs: NDArray[Any]
+) -> NDArray[Any]:
+    """Return `value`, an array into which results of a shape and a type are written, apart from the inputs."""
+    import numpy as np
+
+    needed = f"a writeable array {shape} of {np.dtype(dtype)} in C order is needed"
+    if not isinstance(value, np.ndarray) or np.ma.isMaskedArray(value):
+        raise InputTypeError(f"{what} is {describe(value)}; {needed}")
+    if value.shape != shape or value.dtype != dtype:
+        raise InputError(f"{what} has shape {value.shape} and dtype {value.dtype}; {needed}")
+    if not value.flags.carray:
+        kind = "not aligned" if value.flags.c_contiguous else "not in C order"
+        kind = kind if value.flags.writeable else "read-only"
+        raise InputError(f"{what} is {kind}; {needed}")
+    if any(np.may_share_memory(value, one) for one in inputs):
+        raise InputError(f"{what} overlaps an input; memory of its own is needed")
+    return value
 
 
 def numbers(what: str, value: Any, tail: tuple[int | None, ...] = ()) -> NDArray[Any]:

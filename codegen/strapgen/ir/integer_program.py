@@ -50,6 +50,13 @@ class IntegerSum:
     drop: int = 0  # bits below the last one of the error feedback, dropped before it is added
     #: Whether the rounded sum, and every partial sum with coarse terms, fits into a word.
     in_words: bool = False
+    #: Whether it is rounded down, as the certified error allows, where words are rounded to the nearest.
+    down: bool = False
+
+    def half(self, rounding: str) -> int:
+        """Return half a unit of the result, which is added before the shift; 0 where nothing is."""
+        nearest = rounding == "nearest" and not self.down and self.residual is None
+        return 1 << (self.shift - 1) if self.shift and nearest else 0
 
 
 @dataclass(frozen=True)
@@ -143,7 +150,7 @@ def _sum_counts(total: IntegerSum, rounding: str) -> dict[str, int]:
     if total.residual is not None:
         additions += 1
         shifts += 2 * bool(total.residual.shift) + bool(total.drop)
-    elif total.shift and rounding == "nearest":
+    elif total.half(rounding):
         additions += 1
     return {"add": additions, "multiply": products, "shift": shifts}
 

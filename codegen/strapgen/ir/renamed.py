@@ -32,7 +32,7 @@ def renamed_parameters(**names: str) -> Callable[[Callable[P, R]], Callable[P, R
     def decorate(function: Callable[P, R]) -> Callable[P, R]:
         @functools.wraps(function)
         def call(*values: P.args, **rest: P.kwargs) -> R:
-            if names.keys() & rest:
+            if rest and names.keys() & rest:
                 return function(*values, **current(dict(rest), names))
             return function(*values, **rest)
 

@@ -20,6 +20,7 @@ from strapgen.ir.exceptions import InputError
 from strapgen.lab.motions.motion_names import is_file
 from strapgen.lab.recordings.attitude_names import TRAJECTORIES
 from strapgen.lab.recordings.log_topic import split_topic
+from strapgen.run.backend_names import ORDERS
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -537,6 +538,16 @@ class RunOptions:
             "--initial-deg",
             metavar="R,P,H",
             help="Roll, pitch and heading at the start in deg, of each piece of a recording.  [default: zero rotation]",
+        ),
+    ] = None
+    order: Annotated[
+        _Text,
+        option(
+            "--order",
+            metavar="ORDER",
+            help="sequential multiplies the steps one after the other; scan multiplies blocks of steps side by side, "
+            "on the back ends c and c-float: its bits are its own, by rounding.  [default: sequential]",
+            read=names(ORDERS),
         ),
     ] = None
 

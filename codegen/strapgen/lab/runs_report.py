@@ -26,6 +26,7 @@ from strapgen.results import figures
 from strapgen.results.records import INTERNAL, entry, properties
 from strapgen.results.result import Result
 from strapgen.results.table import Column, TextTable
+from strapgen.run.backend_names import SEQUENTIAL
 
 if TYPE_CHECKING:
     from strapgen.catalogue import Choice
@@ -76,6 +77,8 @@ def step_facts(backend: Backend, choice: Choice) -> dict[str, Any]:
         facts["previous"] = backend.previous
     if backend.ahead:
         facts["ahead"] = backend.ahead
+    if backend.order != SEQUENTIAL:
+        facts["order"] = backend.order
     return facts | {"backend": backend.name}
 
 
@@ -93,6 +96,8 @@ class RunSettings:
     previous: int | None = field(metadata=entry(optional=True))
     #: Increments from after a step that it takes too
     ahead: int | None = field(metadata=entry(optional=True))
+    #: Order in which the steps were multiplied, where it is not one after the other
+    order: str | None = field(metadata=entry(optional=True))
     #: Name or file of a described system
     system: str | None = field(metadata=entry(optional=True))
     backend: str | None = field(metadata=entry(optional=True))

@@ -17,6 +17,7 @@ from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError
 from strapgen.lab.recordings.attitude_options import FormOptions, TruthOptions
 from strapgen.lab.run_options import ONE_SCALE, SOURCE_NEEDED, RunOptions, RunOutput, SampleSource, described
+from strapgen.run.backend_names import SEQUENTIAL
 
 if TYPE_CHECKING:
     from strapgen.catalogue import Choice
@@ -86,7 +87,11 @@ def simulate(
     def build(seconds: float, largest: Callable[[], float]) -> Backend:
         settings = fixed.settings_for_run(backend, choice.increments_per_step, seconds, largest)
         return backends.backend(
-            choice, backend=backend, orthonormalization=intervals.scheme, settings=settings
+            choice,
+            backend=backend,
+            orthonormalization=intervals.scheme,
+            settings=settings,
+            order=intervals.order or SEQUENTIAL,
         )
 
     with np.errstate(all="ignore"):  # numbers that overflow are refused, in one line
@@ -188,6 +193,8 @@ class _OnRecording:
             one for one in registration.extensions("lab.whole-recordings") if one.covers(choice, backend.name)
         )
         runner = next(whole, None)
+        if runner is not None and intervals.order is not None:
+            raise InputError(f"--order does not go with {choice.kernel}, which runs in a way of its own")
 
         def along(piece: Recording, record: Positive | None, start: Any) -> History:
             options = (intervals.orthonormalize, record, pulse, start)

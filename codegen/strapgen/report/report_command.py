@@ -13,7 +13,7 @@ from strapgen.cli.fixed_options import FixedOptions
 from strapgen.cli.option_groups import Needs, Rule, Shown, command_line, grouped, rules
 from strapgen.cli.options import Duration, FastBackends, GyroRate, SeveralMethods, option
 from strapgen.cli.output import Output
-from strapgen.cli.progress import track
+from strapgen.cli.progress import track, waiting
 from strapgen.cli.values import Positive
 from strapgen.lab.motions.motion_names import is_file
 from strapgen.lab.run_options import (
@@ -160,7 +160,8 @@ def _page(
     frontier.require_steps(several, conditions.sample_hz, conditions.duration)  # before what takes long
     known = [*track(dossier.dossiers(cases), "gathering", len(cases))]
     drifts_and_costs = [*track(dossier.drifts_and_costs(several, conditions), "comparing", len(several))]
-    tables = dossier.tables(shown, places)
+    with waiting("running the tables"):
+        tables = dossier.tables(shown, places)
     content = Content(
         _title(choices),
         command,

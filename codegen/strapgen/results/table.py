@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import html
 import io
 import math
 import re
@@ -189,6 +188,8 @@ class TextTable:
 
     def as_html(self, caption: str = "") -> str:
         """Return the table in HTML for a notebook; a column's header has the title of its group before it."""
+        import html  # whose table of characters is long
+
         sides = {"<": "left", ">": "right", "^": "center"}
         styles = [f' style="text-align:{sides[column.align]}"' for column in self.columns]
 

@@ -21,7 +21,15 @@ from strapgen.ir.notebook_display import counted_shape, short_repr
 from strapgen.ir.read_only import read_only
 from strapgen.ir.renamed import renamed, renamed_parameters
 from strapgen.ir.sources import Sources
-from strapgen.run.backend_names import BACKENDS, DEFAULT_BACKENDS, Entry, of_sources
+from strapgen.run.backend_names import (
+    BACKENDS,
+    DEFAULT_BACKENDS,
+    ORDERS,
+    SCANNING,
+    SEQUENTIAL,
+    Entry,
+    of_sources,
+)
 from strapgen.run.evaluators import Array, Evaluator, Loop, in_si
 from strapgen.run.increments import PART, run_parts
 from strapgen.run.kernel_sources import StepSources, sources_of_choice
@@ -66,6 +74,8 @@ class Backend:
     ----------
     parts : StepSources
         Sources of an attitude step and of its kernels.
+    order : str, optional
+        Order in which the steps of a run are multiplied, see `strapgen.backend`.
 
     Attributes
     ----------
@@ -123,12 +133,13 @@ class Backend:
         state = f"state {counted_shape(self.state_shape)} {self.dtype}"
         return f"{self.name}: {self.kernel}, {self.samples_per_step} {self.takes} a step, {state}"
 
-    def __init__(self, parts: StepSources) -> None:
+    def __init__(self, parts: StepSources, order: str = SEQUENTIAL) -> None:
         sources, kernels = parts.step, parts.step_kernels
         state, samples = sources.function.inputs
         self._parts = parts
         self.sources = sources
         self.evaluator: Evaluator = of_sources(sources)
+        self.order: str = self._allowed(order, kernels.product)
         self.name: str = self.evaluator.name
         self.kernel: str = sources.kernel
         self.takes: str = samples.name
@@ -161,7 +172,21 @@ class Backend:
         """Return the class and its sources, from which another process builds the same back end."""
         target = self.sources.target
         needed = [(self._orthonormalization, target), (self._product, target), (self.attitude, NUMPY)]
-        return type(self), (self._parts.complete(needed),)
+        return type(self), (self._parts.complete(needed), self.order)
+
+    def _allowed(self, order: str, product: str | None) -> str:
+        """Return an order in which the code of the step can be run."""
+        checks.choice("order", order, ORDERS)
+        if order == SEQUENTIAL or self.evaluator.scans:
+            return order
+        kernel, name = self.sources.kernel, self.evaluator.name
+        if product is None:
+            reason = f"a step that is linear in its state is needed, and {kernel} is not"
+        elif name not in SCANNING:
+            reason = f"it goes with the back ends {' and '.join(SCANNING)}, not with {name}"
+        else:
+            reason = f"the transition of {kernel} holds constants, and its code no product of transitions"
+        raise InputError(f"order is {order}; {reason}")
 
     @property
     def nodes(self) -> tuple[float, ...]:
@@ -351,6 +376,8 @@ class Backend:
         orthonormalize_every: int | None = None,
         initial: Any = None,
         jobs: int = 1,
+        *,
+        out: Any = None,
     ) -> Array:
         """Run the algorithm over a sequence of samples.
 
@@ -367,6 +394,9 @@ class Backend:
         jobs : int, optional
             Number of threads that share independent runs of C in double or float, which needs no lock of the
             interpreter; other back ends use one. The bits are those of one thread.
+        out : array, (..., 1 + N // record_every, state shape), optional
+            Memory into which the result is written and which is returned: of the type `dtype`, in C order and apart
+            from the inputs. After an error its numbers are undefined.
 
         Returns
         -------
@@ -385,7 +415,7 @@ class Backend:
         >>> backend("euler", backend="numpy").propagate(turn)[-1].round(6)
         array([0.      , 0.      , 0.707107, 0.707107])
         """
-        d = checks.real_array("samples", samples, (self.samples_per_step, 3), self.dtype)
+        d = checks.real_array("samples", samples, (self.samples_per_step, 3), self.dtype, finite=False)
         if d.ndim < 3:
             raise InputError(
                 f"samples has shape {d.shape}; (..., steps, {self.samples_per_step}, 3) is needed"
@@ -403,12 +433,26 @@ class Backend:
             ) from None
         shape = (*batch, 1 + steps // record_every, *self.state_shape)
         runs = math.prod(batch)
+        if out is not None:
+            out = checks.output_array("out", out, shape, self.dtype, d, start)
+        # Steps after which the last record tells whether all samples were finite.
+        told = steps // record_every * record_every
+        if "restore" in schedule or not self.evaluator.spreads_nonfinite:
+            told = 0
+        checks.require_finite("samples", samples, d[..., told:, :, :])
         if not runs:
-            return np.empty(shape, self.dtype)
+            return np.empty(shape, self.dtype) if out is None else out
         rows = self._rows(d.reshape(runs, steps, self.samples_per_step, 3))
         begun = self._begin(start.reshape(runs, *self.state_shape))
-        history, _ = self.evaluator.loop(rows, replace(begun, **schedule, jobs=jobs))
-        return self._states(history).reshape(shape)
+        loop = replace(begun, **schedule, jobs=jobs, order=self.order, out=out)
+        history, _ = self.evaluator.loop(rows, loop)
+        if told and not np.isfinite(history[:, -1]).all():
+            checks.require_finite("samples", samples, d)
+        states = self._states(history).reshape(shape)
+        if out is None or np.may_share_memory(states, out):
+            return states
+        out[...] = states
+        return np.asarray(out)
 
     def propagate_parts(
         self,
@@ -417,6 +461,8 @@ class Backend:
         record_every: int = 1,
         orthonormalize_every: int | None = None,
         initial: Any = None,
+        *,
+        out: Any = None,
     ) -> Array:
         """Run the algorithm over increments that come part by part.
 
@@ -428,7 +474,7 @@ class Backend:
             ``part(first, count)`` returns the increments of some steps, (count, samples, 3), one part after the other.
         steps : int
             Number of steps of the run.
-        record_every, orthonormalize_every, initial : optional
+        record_every, orthonormalize_every, initial, out : optional
             As for `propagate`; one run has one initial state.
 
         Returns
@@ -441,12 +487,17 @@ class Backend:
             As `propagate` does.
         """
         if steps <= PART:
-            return self.propagate(part(0, steps), record_every, orthonormalize_every, initial)
+            return self.propagate(part(0, steps), record_every, orthonormalize_every, initial, out=out)
         schedule = self._schedule(record_every, orthonormalize_every)
         record_every, orthonormalize_every = schedule["record_every"], schedule.get("restore_every")
-        schedule["record_every"] = 1
-        history = np.empty((1 + steps // record_every, *self.state_shape), self.dtype)
-        history[0] = start = self._start(initial)
+        schedule |= {"record_every": 1, "order": self.order}
+        shape, start = (1 + steps // record_every, *self.state_shape), self._start(initial)
+        history: Array = (
+            np.empty(shape, self.dtype)
+            if out is None
+            else checks.output_array("out", out, shape, self.dtype, start)
+        )
+        history[0] = start
         loop = self._begin(np.broadcast_to(start, self.state_shape)[None])
         for first, count, restore_every in run_parts(steps, orthonormalize_every or 0):
             samples = checks.real_array("samples", part(first, count), (self.samples_per_step, 3), self.dtype)
@@ -570,6 +621,7 @@ def backend(
     *,
     previous: int | None = None,
     ahead: int | None = None,
+    order: str = SEQUENTIAL,
 ) -> Backend:
     """Return an attitude algorithm as a back end, generated and compiled if it is not in the cache.
 
@@ -593,6 +645,11 @@ def backend(
     previous, ahead : int, optional
         Numbers of increments from before the step and from after it that it takes in addition, together at most 32;
         by default 0.
+    order : str, optional
+        "sequential" multiplies the steps of a run one after the other, with the bits of the step itself. "scan" is for
+        long single runs of the back ends "c" and "c-float" and of a step that is linear in its state: blocks of
+        transitions are multiplied side by side. It is a rounding order of its own, with bits of its own, which are the
+        same on every machine.
 
     Returns
     -------
@@ -601,7 +658,7 @@ def backend(
     Raises
     ------
     InputError
-        If a name or number is not allowed.
+        If a name or number is not allowed, or the step has no such order.
     CompilerError
         If the back end needs a C compiler and there is none.
 
@@ -618,7 +675,7 @@ def backend(
     if orthonormalization is not None:
         checks.choice("orthonormalization", orthonormalization, choice.orthonormalizations)
     step = sources_of_choice(choice, BACKENDS[backend].target, _settings_of_kernel(backend, settings))
-    return Backend(StepSources(step, choice, orthonormalization))
+    return Backend(StepSources(step, choice, orthonormalization), order)
 
 
 def sources_to_build(choice: Choice, backend: str, settings: Settings | None = None) -> list[Sources]:

@@ -4,20 +4,29 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from functools import cache
-from itertools import pairwise
+from functools import cache, cached_property, partial
+from itertools import accumulate, pairwise
+from math import isfinite
 from typing import Any
 
 import numpy as np
 
 from strapgen.ir.exceptions import InputError
+from strapgen.ir.program import COUNTED_AS
 from strapgen.ir.sources import Sources
 from strapgen.run import compiler
+from strapgen.run.backend_names import ORDERS
 from strapgen.run.evaluators import Array, Evaluator, Loop
 from strapgen.targets import TARGETS
 
 #: The types of floating-point targets in numpy.
 _TYPES: dict[str, np.dtype[Any]] = {"double": np.dtype(np.float64), "float": np.dtype(np.float32)}
+#: Operations of `Program.operations` of which none with a number that is not finite is finite.
+_SPREADING = frozenset(("add", "multiply", "negate"))
+#: The other ones.
+_OTHERS = frozenset(kind for kind in COUNTED_AS.values() if kind is not None) - _SPREADING
+#: The generated loop of each order.
+_LOOPS = dict(zip(ORDERS, ("propagate", "scan"), strict=True))
 #: Runs that generated loops take side by side, in any type.
 _GROUP = 16
 
@@ -51,12 +60,29 @@ class CEvaluator(Evaluator):
             self.word_type, self.feedback_type = np.dtype(f"int{word}"), np.dtype(f"uint{word}")
         self.module: Any = compiler.load(sources)
         self._array = getattr(self.module.lib, f"{self.function.name}_array")
+        self._takes_one = fixed is None
+        #: Memory for calls on one sample, of which every thread takes its own.
+        self._idle: list[_OneSample] = []
+        self.scans = hasattr(self.module.lib, f"{self.function.name}_scan")
 
     @property
     def name(self) -> str:
         """Name of the back end."""
         fixed = self.sources.fixed
         return self.sources.target if fixed is None else f"{self.sources.target}{fixed.settings.word}"
+
+    def __call__(self, *values: Any) -> Any:
+        """Evaluate the kernel, see `Evaluator.__call__`: one sample in floating point where it lies."""
+        if self._takes_one and self.one_sample(values):
+            try:
+                one = self._idle.pop()
+            except IndexError:
+                one = _OneSample(self)
+            results = one.run(values)
+            self._idle.append(one)
+            if results is not None:
+                return results
+        return super().__call__(*values)
 
     def call(self, inputs: Sequence[Any], feedback: Any, where: str = "") -> tuple[Sequence[Any], Any]:
         """Call the function on rows, see `Evaluator.call`."""
@@ -88,6 +114,21 @@ class CEvaluator(Evaluator):
             )
         return InputError(f"{self.kernel} refuses its input{where}: it is too far from a proper one")
 
+    @cached_property
+    def spreads_nonfinite(self) -> bool:
+        """Whether no state after a sample that is not finite is finite.
+
+        No sum or product with a number that is not finite is finite. So it is where a step has no other operations,
+        and every element of its inputs reaches the next state, as one that is no number shows.
+        """
+        if self.sources.fixed is not None or any(self.sources.operations[kind] for kind in _OTHERS):
+            return False
+        sizes = [signal.size for signal in self.function.inputs]
+        rows = np.zeros((sum(sizes), sum(sizes)))
+        np.fill_diagonal(rows, np.nan)
+        outputs, _ = self.call(np.split(rows, np.cumsum(sizes)[:-1], axis=1), np.empty((len(rows), 0)))
+        return bool(np.isnan(outputs[0]).any(axis=1).all())
+
     def pointer(self, array: Array) -> Any:
         """Return the C pointer to a contiguous array's first element."""
         return self.module.ffi.from_buffer(array_type(array.dtype), array)
@@ -100,14 +141,14 @@ class CEvaluator(Evaluator):
     def loop(self, samples: Array, loop: Loop) -> tuple[Array, Array]:
         """Run the loop in C, see `Evaluator.loop`; threads share independent runs in floating point."""
         ffi, name, fixed = self.module.ffi, self.function.name, self.sources.fixed
-        propagate = getattr(self.module.lib, f"{name}_propagate")
+        propagate = getattr(self.module.lib, f"{name}_{_LOOPS[loop.order]}")
         runs, steps = samples.shape[:2]
         state, rows = (
             np.ascontiguousarray(array, kind)
             for array, kind in zip((loop.state, samples), self.input_types, strict=True)
         )
         feedback = np.array(loop.feedback, self.feedback_type)
-        history = np.empty((runs, 1 + steps // loop.record_every, state.shape[1]), self.word_type)
+        history = loop.room((runs, 1 + steps // loop.record_every, state.shape[1]), self.word_type)
         restore = ffi.NULL
         if isinstance(loop.restore, CEvaluator):
             restore = ffi.cast(f"{name}_orthonormalizer", loop.restore.address())
@@ -146,6 +187,32 @@ def _parts(runs: int, jobs: int) -> list[slice]:
     jobs = min(jobs, groups)
     edges = [min(runs, groups * job // jobs * _GROUP) for job in range(jobs + 1)]
     return [slice(first, stop) for first, stop in pairwise(edges) if first < stop]
+
+
+class _OneSample:
+    """Memory of a function in floating point for one sample, whose pointers are made once."""
+
+    def __init__(self, evaluator: CEvaluator) -> None:
+        signals, results = evaluator.function.inputs, evaluator.function.outputs
+        self._numbers = np.empty(sum(signal.size for signal in signals), evaluator.dtype)
+        edges = [0, *accumulate(signal.size for signal in signals)]
+        self._inputs = [
+            self._numbers[first:stop].reshape(signal.shape)
+            for (first, stop), signal in zip(pairwise(edges), signals, strict=True)
+        ]
+        self._results = [np.empty(signal.shape, evaluator.dtype) for signal in results]
+        pointers = map(evaluator.pointer, (*self._inputs, *self._results))
+        self._call = partial(evaluator._array, 1, *pointers)
+
+    def run(self, values: Sequence[Array]) -> Any:
+        """Return the output of the function, or its outputs, for finite inputs; None for others."""
+        for place, value in zip(self._inputs, values):  # noqa: B905  # of one length
+            place[...] = value
+        if not isfinite(sum(self._numbers.tolist())):
+            return None
+        self._call()
+        results = self._results
+        return results[0].copy() if len(results) == 1 else tuple([result.copy() for result in results])
 
 
 class ModelEvaluator(Evaluator):

@@ -18,6 +18,7 @@ from strapgen.ir.fixed_settings import DEFAULT_ALLOWANCE
 from strapgen.ir.interfaces import Argument, Interface
 from strapgen.ir.notebook_display import counted_shape, short_repr
 from strapgen.ir.sources import Function, Sources
+from strapgen.run.backend_names import SEQUENTIAL
 
 Array = NDArray[Any]
 
@@ -36,6 +37,14 @@ class Loop:
         None  # state after a transition, if the class `needs_product` and there is one
     )
     jobs: int = 1  # threads
+    order: str = SEQUENTIAL  # in which the steps are multiplied, one of `ORDERS`
+    out: Array | None = None  # memory for the history, if the caller gives it
+
+    def room(self, shape: tuple[int, ...], number: np.dtype[Any]) -> Array:
+        """Return memory for a history: that of the caller, if its numbers are those of the code."""
+        if self.out is not None and self.out.dtype == number:
+            return self.out.reshape(shape)
+        return np.empty(shape, number)
 
 
 class Evaluator(ABC):
@@ -66,6 +75,8 @@ class Evaluator(ABC):
 
     #: Whether its loop takes the product of transitions.
     needs_product = False
+    #: Whether its loop has the order "scan" beside the default one.
+    scans = False
     interface: Interface
 
     __repr__ = short_repr
@@ -80,6 +91,8 @@ class Evaluator(ABC):
         self.kernel: str = sources.kernel
         self.function: Function = sources.function
         self.dtype: np.dtype[Any] = np.dtype(dtype)
+        self._shapes = [signal.shape for signal in self.function.inputs]
+        self._has_limits = any(signal.limit is not None for signal in self.function.inputs)
         #: Type of the numbers that `run` takes and returns: an object is one of mpmath.
         self.number: np.dtype[Any] = self.dtype
         if sources.fixed is not None:
@@ -94,6 +107,11 @@ class Evaluator(ABC):
     def name(self) -> str:
         """Name of the back end."""
         return self.sources.target
+
+    @property
+    def spreads_nonfinite(self) -> bool:
+        """Whether no state after a sample that is not finite is finite, so that the last one tells of it."""
+        return False
 
     def __call__(self, *values: Any) -> Any:
         """Evaluate the kernel.
@@ -133,6 +151,27 @@ class Evaluator(ABC):
             raise InputError(f"the leading axes of {shapes} do not broadcast together") from None
         results = self.evaluate(arrays, batch)
         return results[0] if len(results) == 1 else results
+
+    def one_sample(self, values: Sequence[Any]) -> bool:
+        """Return whether inputs are arrays of `dtype` that hold one sample within its range, finite or not.
+
+        A subclass may call its code on such at once, if they are finite; `__call__` checks and converts all others.
+        """
+        if len(values) != len(self._shapes):
+            return False
+        dtype = self.dtype
+        for value, shape in zip(values, self._shapes):  # noqa: B905  # checked above, at less cost
+            if type(value) is not np.ndarray or value.shape != shape or value.dtype != dtype:
+                return False
+        return not self._has_limits or self._within_limits(values)
+
+    def _within_limits(self, values: Sequence[Array]) -> bool:
+        try:
+            for place, value in enumerate(values):
+                self.check_limit(place, value)
+        except InputError:
+            return False
+        return True
 
     def evaluate(self, arrays: Sequence[Array], batch: tuple[int, ...]) -> tuple[Array, ...]:
         """Evaluate on checked arrays whose leading axes broadcast to `batch`."""
@@ -235,7 +274,7 @@ class Evaluator(ABC):
         feedback : array, (runs, number of words)
         """
         runs, steps = samples.shape[:2]
-        history = np.empty((runs, 1 + steps // loop.record_every, loop.state.shape[1]), self.number)
+        history = loop.room((runs, 1 + steps // loop.record_every, loop.state.shape[1]), self.number)
         history[:, 0] = loop.state
         state, feedback = self.pack(loop.state), self.pack(loop.feedback)
         # The first words of the step's feedback are those of its state.

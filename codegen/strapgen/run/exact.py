@@ -12,10 +12,11 @@ array([0.      , 0.      , 0.247396, 0.968913])
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Iterable, Iterator, Sequence
+import re
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from fractions import Fraction
-from functools import cache
+from functools import cache, cached_property
 from typing import Any
 
 import mpmath
@@ -26,7 +27,7 @@ from strapgen import pipeline
 from strapgen.catalogue import Choice
 from strapgen.ir import checks
 from strapgen.ir.notebook_display import short_repr
-from strapgen.ir.program import OPERATIONS, Program
+from strapgen.ir.program import DOUBLE_RESOLUTION, OPERATIONS, RESOLUTION, Program
 from strapgen.ir.renamed import renamed_parameters
 from strapgen.ir.sources import Sources
 from strapgen.run.backends import Backend
@@ -65,6 +66,77 @@ def number(value: Fraction) -> Any:
     return mpmath.mpf(value.numerator) / value.denominator
 
 
+class _NoNumberError(ArithmeticError):
+    """A value is infinite or not a number."""
+
+
+def _parts(value: Any) -> tuple[int, int]:
+    """Return a number of mpmath as an integer and the power of two that it is multiplied by."""
+    sign, integer, power, _ = value._mpf_
+    if not integer and power:
+        raise _NoNumberError
+    return -int(integer) if sign else int(integer), power
+
+
+def _mpf(integer: int, power: int) -> Any:
+    """Return an integer times a power of two as a number of mpmath."""
+    return mpmath.mp.make_mpf(mpmath.libmp.from_man_exp(integer, power))
+
+
+#: Operations on integers m times powers of two e, where a and b are two numbers; `round` makes a result one of mpmath.
+_ON_INTEGERS = {
+    "add": "m, e = ((am << ae - be) + bm, be) if ae >= be else (am + (bm << be - ae), ae); round",
+    "subtract": "m, e = ((am << ae - be) - bm, be) if ae >= be else (am - (bm << be - ae), ae); round",
+    "multiply": "m, e = am * bm, ae + be; round",
+    "negate": "m, e = -am, ae",
+    "at_least": "m = (am << ae - be if ae >= be else am) >= (bm if ae >= be else bm << be - ae)",
+    "select": "m, e = (bm, be) if am else (cm, ce)",
+}
+#: The names in these lines that stand for those of a slot.
+_NAME = re.compile(r"\b([abc]?[me])\b")
+#: To the nearest, of two as near to the even one.
+_ROUND = "n = m.bit_length() - bits\n    if n > 0: m, e = m + (1 << n - 1) - 1 + (m >> n & 1) >> n, e + n"
+
+
+def _on_integers(
+    program: Program, constant: Callable[[Fraction], Any]
+) -> Callable[[Mapping[str, Any]], dict[str, list[Any]]]:
+    """Return a program as a function with the bits of its run on numbers of mpmath, in a fifth of the time.
+
+    Sums and products are of Python's integers, in lines of their own; mpmath makes an object of every value. Its own
+    functions do the rest. The function raises `_NoNumberError` where a value is infinite or not a number.
+    """
+    code = program._instructions
+    known: dict[str, Any] = {"parts": _parts, "mpf": _mpf, **{f"f_{k}": f for k, f in _OPERATIONS.items()}}
+    lines = ["def run(values):", "    bits = mp.prec"]
+    known["mp"] = mpmath.mp
+    resolution = constant(DOUBLE_RESOLUTION)
+    for slot, name in code.names:
+        known[f"c{slot}"] = resolution
+        default = f", c{slot}" if name == RESOLUTION else ""
+        lines.append(f"    m{slot}, e{slot} = parts(values.get({name!r}{default}))")
+    for slot, value in code.constants:
+        known[f"m{slot}"], known[f"e{slot}"] = _parts(constant(value))
+    for slot, kind, arguments in code.operations:
+        text = _ON_INTEGERS.get(kind)
+        if text is None:
+            numbers = ", ".join(f"mpf(m{k}, e{k})" for k in arguments)
+            lines.append(f"    m{slot}, e{slot} = parts(f_{kind}({numbers}))")
+            continue
+        names = {"m": f"m{slot}", "e": f"e{slot}"}
+        for letter, k in zip("abc", arguments, strict=False):
+            names |= {f"{letter}m": f"m{k}", f"{letter}e": f"e{k}"}
+        pieces = _NAME.split(text.replace("round", _ROUND))
+        lines.append("    " + "".join(names.get(piece, piece) for piece in pieces))
+    listed = ", ".join(
+        f"{name!r}: [{', '.join(f'mpf(m{k}, e{k})' for k in slots)}]" for name, slots in code.results
+    )
+    lines.append(f"    return {{{listed}}}")
+    exec(compile("\n".join(lines), f"<{program.kernel} on integers>", "exec"), known)
+    run: Callable[[Mapping[str, Any]], dict[str, list[Any]]] = known["run"]
+    return run
+
+
 class Interpreter:
     """Runs a program on numbers of mpmath, whose precision the caller sets.
 
@@ -84,6 +156,9 @@ class Interpreter:
         self.program = program
         self._constants: dict[Fraction, Any] = {}
 
+    def __reduce__(self) -> tuple[type[Interpreter], tuple[Program]]:
+        return type(self), (self.program,)
+
     def __call__(self, *inputs: Iterable[Any]) -> list[Any]:
         """Return the elements of the last output, from the elements of every input."""
         return list(self.outputs(*inputs).values())[-1]
@@ -93,7 +168,14 @@ class Interpreter:
         values: dict[str, Any] = {}
         for signal, elements in zip(self.program.inputs, inputs, strict=True):
             values |= zip(signal.elements, elements, strict=True)
+        if all([type(value) is mpmath.mpf for value in values.values()]):
+            with suppress(_NoNumberError):
+                return self._on_integers(values)
         return self.program.run(values, self._constant, _OPERATIONS)
+
+    @cached_property
+    def _on_integers(self) -> Callable[[Mapping[str, Any]], dict[str, list[Any]]]:
+        return _on_integers(self.program, self._constant)
 
     def _constant(self, value: Fraction) -> Any:
         if value not in self._constants:

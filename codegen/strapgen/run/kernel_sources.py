@@ -4,17 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from strapgen import catalogue, pipeline
 from strapgen.catalogue import Choice
 from strapgen.ir.exceptions import InputError, InputTypeError
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.kernel_info import AttitudeStep
-from strapgen.ir.program import Program
 from strapgen.ir.sources import Sources
 from strapgen.targets import TARGETS
-from strapgen.targets.names import UNNAMED, Naming
+from strapgen.targets.naming import UNNAMED, Naming
+
+if TYPE_CHECKING:
+    from strapgen.ir.program import Program
 
 
 @dataclass(frozen=True, kw_only=True)

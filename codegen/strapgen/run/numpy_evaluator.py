@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
 
-from strapgen.ir.sources import Sources
+from strapgen.ir.sources import Function, Sources
 from strapgen.run import compiler
 from strapgen.run.evaluators import Array, Evaluator, Loop
 from strapgen.run.increments import PART
@@ -30,6 +30,22 @@ class NumpyEvaluator(Evaluator):
     def __init__(self, sources: Sources) -> None:
         super().__init__(sources, np.float64)
         self.generated: Callable[..., Any] = getattr(compiler.load(sources), self.function.name)
+
+    def __call__(self, *values: Any) -> Any:
+        """Evaluate the kernel, see `Evaluator.__call__`: one sample on Python's floats, to the same bits."""
+        if self._on_floats is not None and self.one_sample(values):
+            results = self._on_floats([value.ravel().tolist() for value in values])
+            if results is not None:
+                return results
+        return super().__call__(*values)
+
+    @cached_property
+    def _on_floats(self) -> FloatProgram | None:
+        """The operations of the function on one sample; None of a function that selects by a condition."""
+        try:
+            return FloatProgram(self.generated, self.function)
+        except TypeError:
+            return None
 
     def evaluate(self, arrays: Sequence[Array], batch: tuple[int, ...]) -> tuple[Array, ...]:
         """Evaluate on checked arrays, many samples in blocks whose temporaries stay in the cache."""
@@ -87,7 +103,7 @@ class NumpyEvaluator(Evaluator):
             return super().loop(samples, loop)
         runs, steps = samples.shape[:2]
         shape = self.function.inputs[0].shape
-        history = np.empty((runs, 1 + steps // loop.record_every, *shape))
+        history = loop.room((runs, 1 + steps // loop.record_every, *shape), self.number)
         history[:, 0] = state = loop.state.reshape(runs, *shape)
         assert self.sources.attitude_step is not None, "only an attitude step has a product"
         identity = np.array([float(x) for x in self.sources.attitude_step.identity])
@@ -366,6 +382,13 @@ class _Value(np.lib.mixins.NDArrayOperatorsMixin):
             raise TypeError(f"{operation.__name__} is recorded as an operation on elements alone")
         return _Value(self.tape, operation, operands)
 
+    def __getattr__(self, name: str) -> Callable[..., _Value]:
+        """Return an operation, such as a sine, that numpy calls on an element of an array as its method."""
+        operation = getattr(np, name, None)
+        if not isinstance(operation, np.ufunc):
+            raise AttributeError(name)
+        return partial(operation, self)
+
     def __bool__(self) -> bool:
         """Refuse a branch, which all samples would take."""
         raise TypeError("a recorded value is neither true nor false")
@@ -390,13 +413,11 @@ class ArrayProgram:
         self._function, self._shapes = function, inputs
         self._operations: Callable[..., None] = self._whole
         self.temporaries = 0
-        tape: list[_Value] = []
-        values = [[_Value(tape) for _ in range(math.prod(shape))] for shape in inputs]
         try:
-            results = function(*(np.array(x, object).reshape(s) for x, s in zip(values, inputs, strict=True)))
+            values, (results,), tape = _record(function, inputs)
         except TypeError:
             return
-        outputs = [_output(x, tape) for x in results.flat]
+        outputs = [_output(x, tape) for x in results]
         self.temporaries = _allocate([*values, outputs], tape)
         self._operations = _compile(tape, [*map(len, values), len(outputs), self.temporaries])
 
@@ -412,6 +433,79 @@ class ArrayProgram:
             for x, shape in zip(inputs, self._shapes, strict=True)
         ]
         out[...] = np.moveaxis(self._function(*split).reshape(*out.shape[1:], len(out)), -1, 0)
+
+
+#: Operations on Python's own floats with the bits of numpy's; those on its floats, of any other operation, cost more.
+_OF_FLOATS = {
+    "add": "{} + {}",
+    "subtract": "{} - {}",
+    "multiply": "{} * {}",
+    "divide": "{} / {}",
+    "negative": "-{}",
+    "positive": "{}",
+    "sqrt": "root({})",
+}
+
+
+class FloatProgram:
+    """The operations of a generated function on the floats of one sample.
+
+    Numpy takes as long for an operation on one number as on hundreds. A function that selects by a condition cannot be
+    recorded, which is a TypeError.
+
+    Examples
+    --------
+    >>> from strapgen import evaluator
+    >>> made = evaluator("euler-normalize")
+    >>> FloatProgram(made.generated, made.function)([[0.0, 0.0, 0.0, 2.0]])
+    array([0., 0., 0., 1.])
+    """
+
+    def __init__(self, function: Callable[..., Any], signature: Function) -> None:
+        self._shapes = [signal.shape for signal in signature.outputs]
+        values, results, tape = _record(function, [signal.shape for signal in signature.inputs])
+        known: dict[str, Any] = {"root": math.sqrt}
+        for k, signal in enumerate(values):
+            for i, value in enumerate(signal):
+                value.place = f"x{k}_{i}"
+        lines = [f"def run({', '.join(f'x{k}' for k in range(len(values)))}):"]
+        lines += [f"    {', '.join(value.place for value in x)}, = x{k}" for k, x in enumerate(values) if x]
+        for number, step in enumerate(tape):
+            name, operands = step.operation.__name__, [_text(x) for x in step.operands]
+            known[name] = step.operation
+            call = _OF_FLOATS.get(name, f"float({name}({', '.join(operands)}))").format(*operands)
+            step.place = f"t{number}"
+            lines.append(f"    {step.place} = {call}")
+        listed = [f"[{', '.join(map(_text, elements))}]" for elements in results]
+        lines.append(f"    return {', '.join(listed)},")
+        exec(compile("\n".join(lines), "<operations of a generated function>", "exec"), known)
+        self._run: Callable[..., tuple[list[float], ...]] = known["run"]
+
+    def __call__(self, rows: list[list[float]]) -> Array | tuple[Array, ...] | None:
+        """Return the output, or the outputs; None where a number is not finite, of which numpy would warn."""
+        try:
+            results = self._run(*rows)
+        except (ArithmeticError, ValueError):
+            return None
+        if not math.isfinite(sum(map(sum, (*rows, *results)))):
+            return None
+        arrays = [np.array(x).reshape(shape) for x, shape in zip(results, self._shapes, strict=True)]
+        return arrays[0] if len(arrays) == 1 else tuple(arrays)
+
+
+def _text(value: Any) -> str:
+    """Return an operand as Python writes it."""
+    return value.place if isinstance(value, _Value) else f"({float(value)!r})"
+
+
+def _record(
+    function: Callable[..., Any], inputs: list[tuple[int, ...]]
+) -> tuple[list[list[_Value]], list[list[Any]], list[_Value]]:
+    """Return the elements of a function's inputs, those of its outputs, and its operations in order."""
+    tape: list[_Value] = []
+    values = [[_Value(tape) for _ in range(math.prod(shape))] for shape in inputs]
+    results = function(*(np.array(x, object).reshape(s) for x, s in zip(values, inputs, strict=True)))
+    return values, [[*x.flat] for x in (results if isinstance(results, tuple) else (results,))], tape
 
 
 def _output(value: Any, tape: list[_Value]) -> _Value:

@@ -6,7 +6,6 @@ import gc
 import os
 import signal
 import threading
-from multiprocessing import connection, parent_process
 
 #: Objects made since the last search for garbage at which Python searches again, by generation. A derivation makes
 #: millions that stay: with the 700 of the default a third of its time is searching.
@@ -30,6 +29,7 @@ def begin_worker() -> None:
 
 def end_with_parent() -> None:
     """End this process when its parent process has ended; do nothing in a process without a parent."""
+    from multiprocessing import connection, parent_process  # here, since every command imports this module
 
     def wait(sentinel: int) -> None:
         connection.wait([sentinel])

@@ -7,12 +7,15 @@ import difflib
 import re
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from strapgen import catalogue, fixedpoint, pipeline
+from strapgen import catalogue, pipeline
 from strapgen.ir.exceptions import InputError
-from strapgen.ir.program import Program
 from strapgen.storage.files import is_staged, write_files
 from strapgen.targets import BUILT_IN, TARGETS
+
+if TYPE_CHECKING:
+    from strapgen.ir.program import Program
 
 #: The folder of each target in the tree.
 _FOLDERS = {name: target.folder for name, target in BUILT_IN.items() if target.folder}
@@ -42,6 +45,8 @@ def tree(lowered: Iterable[Program], targets: Iterable[str] | None = None) -> di
 
     Paths have forward slashes. The list of all kernels belongs to the whole tree.
     """
+    from strapgen import fixedpoint
+
     files: dict[str, str] = {}
     rows: list[str] = []
     names = list(_FOLDERS if targets is None else targets)

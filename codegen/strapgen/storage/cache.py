@@ -25,7 +25,7 @@ import time
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from functools import cache, wraps
-from importlib.metadata import version
+from importlib.machinery import PathFinder
 from pathlib import Path
 from typing import Any, ParamSpec, TypeVar
 
@@ -80,7 +80,18 @@ def digest(parts: Iterable[str | bytes]) -> str:
 @cache
 def generator_digest() -> str:
     """Return a hash of everything that determines generated code: this package, its templates, and SymPy's version."""
-    return digest([version("sympy"), *(path.read_bytes() for path in resources.package_files())])
+    return digest([_release_of_sympy(), *(path.read_bytes() for path in resources.package_files())])
+
+
+def _release_of_sympy() -> bytes:
+    """Return the file in which SymPy states its version; what reads the descriptions of packages imports much."""
+    spec = PathFinder.find_spec("sympy")
+    if spec is not None and spec.origin is not None:
+        with suppress(OSError):
+            return Path(spec.origin).with_name("release.py").read_bytes()
+    from importlib.metadata import version
+
+    return version("sympy").encode()
 
 
 def stored(kind: str, parts: Iterable[str | bytes], work: Callable[[], Result], what: str = "") -> Result:

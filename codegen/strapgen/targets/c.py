@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import TYPE_CHECKING, Any
 
 from strapgen.fixedpoint.floating import rounding_bounds
 from strapgen.ir.interfaces import RoundingBounds
-from strapgen.ir.program import Operation, Program, names_in, walk
+from strapgen.ir.program import Operation, Program, Reference, names_in, walk
 from strapgen.ir.signals import Signal
 from strapgen.ir.sources import Sources
 from strapgen.targets import contract, contract_lines
@@ -214,6 +214,12 @@ _VECTOR = 16
 _ABREAST = 64
 #: Bytes of a run's samples by which memory is fetched ahead: its latency is that of some steps of all runs.
 _FETCHED = 512
+#: Lanes of a block of a scan, and the steps of each: a block and its states fit into the nearest cache.
+_SCAN_LANES, _SCAN_DEPTH = 8, 16
+#: Bytes of a history from which on a scan streams it to memory.
+_STREAMED = 1 << 20
+#: Bytes of a line of the cache.
+_LINE = 64
 #: Operations that C compilers know on vectors.
 _OF_VECTORS = frozenset(("add", "subtract", "multiply", "divide", "negate"))
 
@@ -230,7 +236,7 @@ def _loop(program: Program, printer: CPrinter, name: str) -> dict[str, object]:
     lanes, abreast = _VECTOR // real.bytes, _ABREAST // real.bytes
 
     def in_lanes(wide: str) -> dict[str, object]:
-        load = f"{name}{wide}_LANES_OF_".upper() + f"({increments.name}, {{}})"
+        load = f"{name}{wide}_LANES_OF_".upper() + f"({increments.name}, apart, {{}})"
         places = {increments.name: load, "prepared": "prepared[{}].all"}
         return code_of(ahead, printer, places, number_type=f"{name}{wide}_lanes_")
 
@@ -245,14 +251,66 @@ def _loop(program: Program, printer: CPrinter, name: str) -> dict[str, object]:
         "ahead": in_lanes(""),
         "wide_ahead": in_lanes("_wide"),
         "behind": code_of(behind, printer, {"prepared": "prepared[{}].one[k]"}),
+        "scan": _scan(program, behind, printer, name),
         "abreast_step": code_of(
             program, printer, states | {increments.name: f"{increments.name}[apart * k + {{}}]"}, 2
         ),
         "rows": ", ".join(f"{constant}{real.name} *restrict {s.name}_{k}" for s, constant, k in rows),
+        "array_arguments": ", ".join(signal.name for signal, _ in signals),
         "row_arguments": ", ".join(f"{s.name} + {k} * runs" for s, _, k in rows),
         "batch": code_of(
             program, printer, {signal.name: f"{signal.name}_{{}}[k]" for signal, _ in signals}, 2
         ),
+    }
+
+
+def _scan(program: Program, behind: Program, printer: CPrinter, name: str) -> dict[str, object] | None:
+    """Return the statements of a scan: a step in lanes, and the product of a state and a transition.
+
+    There is none of a step that is not linear in its state, nor of one whose transition holds constants: the product
+    that it has leaves them out.
+    """
+    kernels, transition = program.attitude_step, program.transition
+    if kernels is None or kernels.product is None or transition is None:
+        return None
+    names = tuple(node.name for node in transition.nodes if isinstance(node, Reference))
+    state, prepared = behind.inputs
+    complete = len(set(names)) == len(transition.nodes) == state.size
+    if not complete or not set(prepared.elements) <= set(names) or not _in_vectors(behind):
+        return None
+    result, real, block = behind.outputs[0].signal, printer.real, _SCAN_LANES * _SCAN_DEPTH
+    total = Signal("transition", (state.size,), names, meaning="product of transitions")
+    product = replace(behind, inputs=(state, total))
+
+    def in_lanes(wide: str, part: Program, *places: str) -> dict[str, object]:
+        signals = [signal.name for signal in (*part.inputs, result)]
+        return code_of(
+            part, printer, dict(zip(signals, places, strict=True)), number_type=f"{name}{wide}_lanes_"
+        )
+
+    code = {
+        f"{wide[1:]}{'_' if wide else ''}{what}": in_lanes(wide, part, *places)
+        for wide in ("", "_wide")
+        for what, part, places in (
+            ("turn", behind, ("own[{}]", "prepared[{}].all", "own[{}]")),
+            (
+                "products",
+                product,
+                (f"{state.name}[{{}}].all", "transition[{}].all", f"{result.name}[{{}}].all"),
+            ),
+        )
+    }
+    return code | {
+        "product": code_of(product, printer),
+        "lanes": _SCAN_LANES,
+        "depth": _SCAN_DEPTH,
+        "identity": ", ".join(map(printer.constant, kernels.identity)),
+        "line": _LINE // real.bytes,
+        "joined": _VECTOR // real.bytes,
+        # Rows that are no whole vectors share lines with their neighbours, which streaming stores would write twice.
+        "streams": not state.size * real.bytes % _VECTOR,
+        "large": _STREAMED // (state.size * real.bytes),
+        "stack": (2 * block + _SCAN_LANES) * state.size * real.bytes,
     }
 
 

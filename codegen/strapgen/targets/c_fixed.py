@@ -5,7 +5,9 @@ The code has no undefined or implementation-defined behaviour, and returns an er
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 from strapgen.ir.formats import signed_digits
 from strapgen.ir.integer_program import (
@@ -125,7 +127,7 @@ class StatementPrinter:
         self.wide_names = {value.name for value in fixed.body if value.wide}
         self.places = {feedback.name: k for k, feedback in enumerate(fixed.interface.residuals)}
         self.checks = any(value.range_checked for value in fixed.body)
-        self.nearest = fixed.interface.settings.rounding == "nearest"
+        self.rounding = fixed.interface.settings.rounding
         self.adds_shifted = fixed.interface.settings.multiply == "shift-add"
         # A file that multiplies nothing else has no function for squares, whose text needs that for products.
         self.has_products = any(
@@ -134,6 +136,7 @@ class StatementPrinter:
             if isinstance(value.definition, IntegerSum)
             for term in (*value.definition.fine, *value.definition.coarse)
         )
+        self.negated = _negated(fixed) if word.bits == 32 else frozenset[str]()
         self.names = {value.name for value in fixed.body}
         self.names |= {name for argument in fixed.interface.inputs for name in argument.signal.elements}
 
@@ -145,8 +148,9 @@ class StatementPrinter:
         """Return the statements of one call: loads, checks of the inputs, the body, stores."""
         interface, kind = self.fixed.interface, self.word.fast
         used = {name for value in self.fixed.body for name in used_by(value)}
-        loads, checks = [], []
+        loads, checks = list[str](), list[str]()
         for argument in interface.inputs:
+            of_argument = []
             largest = argument.format.largest
             whole = (argument.low, argument.high) == (-largest - 1, largest)  # whatever the memory holds
             assert whole or argument.low == -argument.high, "inputs have symmetric ranges"
@@ -158,7 +162,9 @@ class StatementPrinter:
                     source = element
                 if not whole:
                     number_ = source if element in used else self.read(kind, source, argument)
-                    checks.append(self._call("out", number_, limit))
+                    of_argument.append(self._call("out", number_, limit))
+            # The state comes last: it is needed last, and until then its registers are free.
+            checks = of_argument + checks
         body = [line for value in self.fixed.body for line in self.statements(value)]
         stores = [
             f"{self.memory(argument.signal.name)}[{number}] = {self._stored(name)};"
@@ -295,9 +301,10 @@ class StatementPrinter:
                 return [self._declared(kind, name, text or "0", note)]
             return self._result(value, kind, self._join([self.term(term) for term in terms]) or "0", note)
         feedback, lines, shift = definition.residual, [], definition.shift
+        half = definition.half(self.rounding)
+        in_words = definition.in_words and all(map(self._is_word, definition.coarse))
         if feedback is None:
-            half = f" + {self.constant(1 << (definition.shift - 1), wide=True)}" if self.nearest else ""
-            total = fine + half
+            total = f"{fine} + {self.constant(half, wide=True)}" if half else fine
         else:
             place = f"residuals[{self.places[feedback.name]}]"
             fed_back = self._scaled_text(self.cast(wide, place), feedback.shift)
@@ -313,9 +320,9 @@ class StatementPrinter:
             else:
                 lines.append(f"{place} = {text};")
             total = f"{name}_sum"
-        if definition.in_words and all(map(self._is_word, definition.coarse)):
+        if in_words:
             words = [self.word_term(term) for term in definition.coarse]
-            rounded = f"+{self._call('fit', total, str(shift))}"
+            rounded = f"+{self._rounded(value, definition, fine, total)}"
             text = self._join([*words[:1], rounded, *words[1:]])
             return [*lines, self._declared(kind, name, text, note)]
         coarse = [self.term(term) for term in definition.coarse]
@@ -336,6 +343,36 @@ class StatementPrinter:
         if value.saturated:
             return [self._declared(kind, value.name, self._call("sat", text), note)]
         return [self._declared(kind, value.name, self.narrow(text, value), note)]
+
+    def _rounded(self, value: Value, definition: IntegerSum, fine: str, total: str) -> str:
+        """Return what is rounded in a sum as a word; `total` is `fine` and what is added to it before the shift."""
+        half, shift, word = definition.half(self.rounding), definition.shift, self.word.bits
+        if self._is_short(value, definition):
+            inside = [self.word_term(term) for term in definition.fine]
+            inside += [f"+{self.constant(half)}"] * bool(half)
+            return self._call("asr", self._join(inside), str(shift))
+        if word == 32 and shift >= word and definition.residual is None:
+            # What has nothing in the low word is added to the high one.
+            above = [t for t in definition.fine if t.shift >= word and (not t.names or self._is_word(t))]
+            if not half and not above:
+                return self._call("fit", fine, str(shift))
+            below = self._join([self.term(term) for term in definition.fine if term not in above])
+            high = (
+                self._call("near", below) if half and shift == word else self._call("fit", below, str(word))
+            )
+            words = [self.word_term(replace(term, shift=term.shift - word)) for term in above]
+            words += [f"+{self.constant(half >> word)}"] * bool(half >> word)
+            high = self._join([high, *words])
+            if shift > word:
+                return self._call("asr", high, str(shift - word))
+            return f"({high})" if words else high
+        return self._call("fit", total, str(shift))
+
+    def _is_short(self, value: Value, definition: IntegerSum) -> bool:
+        """Return whether what is rounded in a sum is computed in words."""
+        largest = (1 << (self.word.bits - 1)) - 1
+        fits = value.peak <= largest and definition.shift < self.word.bits
+        return fits and definition.residual is None and all(map(self._is_word, definition.fine))
 
     def _is_word(self, term: Term) -> bool:
         """Return whether a term is a word, or a small multiple of one, so that it is computed in words."""
@@ -371,6 +408,8 @@ class StatementPrinter:
             value = term.factor << term.shift if term.shift > 0 else term.factor
             return sign + self.constant(abs(value), wide=True) + _exactly(term)
         factors = list(term.names)
+        if sign == "-" and (negated := self._negated_product(term)):
+            return negated
         if abs(term.factor) != 1 and self.adds_shifted:
             factors = [self._shifted_terms(term)]
         elif abs(term.factor) != 1:
@@ -386,6 +425,24 @@ class StatementPrinter:
         if term.shift < 0 and term.factor < 0:  # what is shifted down is the signed product
             return f"+{self._scaled_text(f'-{text}', term.shift)}"
         return sign + self._scaled_text(text, term.shift)
+
+    def _negated_product(self, term: Term) -> str:
+        """Return a product less than zero as one of a negated factor, so that it can be accumulated; "" without one."""
+        if self.word.bits != 32 or self.adds_shifted:
+            return ""
+        if len(term.names) == 2:
+            factor = next((name for name in term.names if name in self.negated), "")
+            if not factor:
+                return ""
+            (other,) = [name for name in term.names if name != factor] or [factor]
+            text = self._call("nml", other, factor)
+            self.uses.add("mul")
+        else:
+            if abs(term.factor) == 1:
+                return ""
+            number = self.constant(term.factor) + _exactly(term, -1)
+            text = self._call("mul", term.names[0], number)
+        return f"+{self._scaled_text(text, term.shift)}"
 
     def _shifted_terms(self, term: Term) -> str:
         """Return a value times the magnitude of a constant as a sum of shifted terms, in brackets."""
@@ -444,14 +501,40 @@ class StatementPrinter:
         return f"({self.cast(self.word.wide, '1')} << {exponent})"
 
 
-def _exactly(term: Term) -> str:
-    """Return the exact number that a rounded constant stands for, as a comment."""
+def _negated(fixed: FixedProgram) -> frozenset[str]:
+    """Return the factors to negate so that as many products less than zero as possible are accumulated: few of them."""
+    ranges = {name: a.low for a in fixed.interface.inputs for name in a.signal.elements}
+    ranges |= {value.name: value.low for value in fixed.body}
+    products = [
+        {*term.names}
+        for value in fixed.body
+        if isinstance(value.definition, IntegerSum)
+        for term in (*value.definition.fine, *value.definition.coarse)
+        if len(term.names) == 2 and term.factor < 0
+    ]
+    uses = Counter(name for value in fixed.body for name in used_by(value))
+    chosen: set[str] = set()
+    while products := [pair for pair in products if not pair & chosen]:
+        # The negative of the lowest number of a word is none.
+        names = [
+            name for pair in products for name in sorted(pair) if ranges[name] > -(1 << (fixed.word - 1))
+        ]
+        if not names:
+            break
+        # Of those in equally many, the one that is soonest needed no more.
+        chosen.add(max(dict.fromkeys(names), key=lambda name: (names.count(name), -uses[name])))
+    return frozenset(chosen)
+
+
+def _exactly(term: Term, sign: int = 1) -> str:
+    """Return the exact number that a rounded constant stands for, as a comment; with the factor's sign if -1."""
     if (
         term.coefficient is None
         or term.coefficient.value.denominator & (term.coefficient.value.denominator - 1) == 0
     ):
         return ""
-    return f" /* {contract.exact_text(abs(term.coefficient.value))} in Q{term.coefficient.fraction} */"
+    text = contract.exact_text(abs(term.coefficient.value))
+    return f" /* {'-' * (sign < 0)}{text} in Q{term.coefficient.fraction} */"
 
 
 def _branch(word: str, left: str, sign: str, right: str) -> str:

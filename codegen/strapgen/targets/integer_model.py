@@ -94,8 +94,8 @@ def _sum(value: Value, definition: IntegerSum, fixed: FixedProgram, label: str) 
         fine = [f"{name}_kept"]
     if feedback is not None:
         fine.append(_shift(feedback.name, feedback.shift))
-    elif fixed.interface.settings.rounding == "nearest":
-        fine.append(str(1 << (definition.shift - 1)))
+    elif half := definition.half(fixed.interface.settings.rounding):
+        fine.append(str(half))
     lines.append(f'{name}_sum = _total("{label}", {value.peak}, {", ".join(fine)})')
     if feedback is not None:
         mask = (1 << fixed.word) - 1

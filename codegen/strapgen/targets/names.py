@@ -217,71 +217,23 @@ def external(name: str, ending: str = "") -> str:
         if len(name) > _MOST:
             name = _replace(name, word, short)
     name += ending
-    free = _c_allows(name) and name not in LIBRARY and not name.endswith("_t")
-    return name if free else f"{name}_Kernel"  # a capital letter stands in no other kernel's name
+    return name if _is_free(name) else f"{name}_Kernel"  # a capital letter stands in no other kernel's name
+
+
+def _is_free(name: str) -> bool:
+    """Return whether neither C, C++ nor the C library has a name."""
+    return _c_allows(name) and name not in LIBRARY and not name.endswith("_t")
+
+
+def can_be_chosen(name: str) -> bool:
+    """Return whether a function in C can have a name that a user chooses."""
+    return len(name) <= MOST_CHOSEN and _is_free(name)
 
 
 def function_name(program: Program, ending: str = "") -> str:
     """Return the name of a program's function in C: that chosen by the user, or else `external`."""
     default = external(program.name, ending)
     return program.function.format(default) if program.function else default
-
-
-@dataclass(frozen=True)
-class Naming:
-    """The name that the user chooses for a function in C and for its files."""
-
-    name: str | None = None  # the whole name
-    prefix: str | None = None  # in front of the target's name
-    variant: str | None = None  # of strapgen.toml, which the header names
-
-    def __post_init__(self) -> None:
-        if self.name is not None and self.prefix is not None:
-            raise InputError("--name and --prefix are both given; one is needed")
-        if self.option and not re.fullmatch(r"[A-Za-z]\w*", self._text, re.ASCII):
-            raise InputError(
-                f"{self.option} is {self._text!r}; letters, digits and underscores are needed, a letter first"
-            )
-        if self.variant is not None and not re.fullmatch(r"[A-Za-z][\w-]*", self.variant, re.ASCII):
-            raise InputError(
-                f"--variant is {self.variant!r}; letters, digits, - and _ are needed, a letter first"
-            )
-
-    @property
-    def option(self) -> str:
-        """The option of the command line that chooses it; "" if nothing is chosen."""
-        return "--name" if self.name is not None else "--prefix" if self.prefix is not None else ""
-
-    @property
-    def _text(self) -> str:
-        return self.name or self.prefix or ""
-
-    def of(self, program: _P) -> _P:
-        """Return a program with the name."""
-        if isinstance(program, FixedProgram):
-            return program if self == UNNAMED else replace(program, program=self.of(program.program))
-        if self.variant is not None:
-            arguments = f"{program.arguments} --variant {self.variant}"
-            program = replace(program, info=replace(program.info, arguments=arguments))
-        if not self.option:
-            return program
-        chosen = replace(
-            program,
-            function=self._text if self.prefix is None else f"{self._text}{{}}",
-            info=replace(program.info, arguments=f"{program.arguments} {self.option} {self._text}"),
-        )
-        for ending in ("",) if self.prefix is None else ("", "_float", "_w32"):
-            final = function_name(chosen, ending)
-            if len(final) > MOST_CHOSEN or not _c_allows(final) or final in LIBRARY or final.endswith("_t"):
-                raise InputError(
-                    f"{self.option} {self._text} makes a function {final}; a name of at most {MOST_CHOSEN} "
-                    "characters is needed, that neither C, C++ nor the C library has"
-                )
-        return chosen
-
-
-#: Nothing is chosen.
-UNNAMED = Naming()
 
 
 def printed(

@@ -75,12 +75,27 @@ def _shifts_down(function: BitVectorFunction, places: int) -> bool:
     result = function.result(
         {"x": Bits(kind, x), "n": Bits(place_kind, z3.BitVecVal(places, place_kind.bits))}
     )
-    quotient = x >> places
-    low = z3.BitVecVal(result.kind.low, kind.bits)
-    high = z3.BitVecVal(result.kind.high, kind.bits)
+    return _returns(function, result, x >> places)
+
+
+def rounds_to_nearest(function: c_ast.FuncDef, model: Model) -> bool:
+    """Return whether a function of ``x`` is proved to return its high word, rounded to the nearest, likewise."""
+    executed = BitVectorFunction(function, model)
+    kind = executed.kind("x")
+    x = z3.BitVec("x", kind.bits)
+    result = executed.result({"x": Bits(kind, x)})
+    word = result.kind.bits
+    return _returns(executed, result, (z3.SignExt(1, x) + (1 << (word - 1))) >> word)
+
+
+def _returns(function: BitVectorFunction, result: Bits, quotient: Any) -> bool:
+    """Return whether a result is proved to be a quotient wherever its type holds that."""
+    bits = quotient.size()
     solver = z3.SolverFor("QF_BV")
-    solver.add(quotient >= low, quotient <= high)
-    solver.add(z3.Not(z3.And(*function.safe, result.extended(kind.bits) == quotient)))
+    solver.add(
+        quotient >= z3.BitVecVal(result.kind.low, bits), quotient <= z3.BitVecVal(result.kind.high, bits)
+    )
+    solver.add(z3.Not(z3.And(*function.safe, result.extended(bits) == quotient)))
     return bool(solver.check() == z3.unsat)
 
 

@@ -18,7 +18,7 @@ from strapgen.evidence.overflow.expressions import (
     Prover,
     Variable,
 )
-from strapgen.evidence.overflow.lemmas import ParsedSource, is_root, shifts_down
+from strapgen.evidence.overflow.lemmas import ParsedSource, is_root, rounds_to_nearest, shifts_down
 
 # What an attempt may take. A later one proves more ranges on the way, where the first does not do.
 _EFFORTS = (100_000, 1_000_000, 4_000_000)
@@ -58,14 +58,23 @@ def _functions(subject: Subject, files: Mapping[str, str], *defined: str) -> dic
 
 
 def _unproved_lemmas(
-    functions: Mapping[str, c_ast.FuncDef], name: str, model: Model, places: set[int], nearest: bool
+    functions: Mapping[str, c_ast.FuncDef],
+    name: str,
+    model: Model,
+    places: Mapping[str, set[int]],
+    nearest: bool,
 ) -> list[Obligation]:
     """Return the functions of the file whose assumed results are not proved."""
     left = []
-    for part in ("fit", "shr"):
+    for part in ("fit", "shr", "asr"):
         function = functions.get(f"{name}_{part}")
-        if function is not None and not shifts_down(function, model, places):
+        if function is not None and not shifts_down(function, model, places[part]):
             left.append(Obligation(f"{name}_{part}", "it must return its argument shifted down"))
+    near = functions.get(f"{name}_near")
+    if near is not None and not rounds_to_nearest(near, model):
+        left.append(
+            Obligation(f"{name}_near", "it must return the high word of its argument, to the nearest")
+        )
     root = functions.get(f"{name}_rt")
     if root is not None and not is_root(root, model, nearest):
         left.append(Obligation(f"{name}_rt", "it must return the integer next to a square root"))
@@ -89,7 +98,7 @@ class KernelStatements:
         self._prover = Prover(effort)
         self._open: list[Obligation] = []
         self._expressions = ExpressionFormulas(model, self._prover, self._call, self._open)
-        self.places: set[int] = set()
+        self.places: dict[str, set[int]] = {part: set() for part in ("fit", "shr", "asr")}
 
     def obligations(self) -> list[Obligation]:
         """Return the unproved obligations; none if the kernel is safe."""
@@ -242,9 +251,13 @@ class KernelStatements:
         inside = self._bound(function, arguments)
         kind = self._kind(function.decl.type.type)
         part = name.removeprefix(f"{self._name}_")
-        if part in ("fit", "shr"):
+        if part == "near":
+            wide, half = inside["x"], 1 << (kind.bits - 1)
+            moved = Number(wide.kind, wide.low + half, wide.high + half, wide.real + half, wide.variables)
+            return self._expressions.converted(self._expressions.floored(moved, kind.bits), kind)
+        if part in ("fit", "shr", "asr"):
             places = inside["n"].low
-            self.places.add(places)
+            self.places[part].add(places)
             return self._expressions.converted(self._expressions.floored(inside["x"], places), kind)
         if part == "rt":
             return self._expressions.rooted(inside["square"], kind, self._nearest)

@@ -21,7 +21,8 @@ from strapgen.navigation.systems.system import Push, SystemStage
 from strapgen.navigation.systems.wiring import Description
 from strapgen.targets import TARGETS
 from strapgen.targets.c import real_of
-from strapgen.targets.names import MOST_CHOSEN, UNNAMED, Naming
+from strapgen.targets.names import MOST_CHOSEN
+from strapgen.targets.naming import UNNAMED, Naming
 
 
 @dataclass(frozen=True)

@@ -41,7 +41,11 @@ def simulated_system(
     output: RunOutput,
 ) -> None:
     """Simulate a described system, and deliver the run."""
-    others = {"--orthonormalize": intervals.orthonormalize, "--scheme": intervals.scheme}
+    others = {
+        "--orthonormalize": intervals.orthonormalize,
+        "--scheme": intervals.scheme,
+        "--order": intervals.order,
+    }
     refuse_options(method, fixed, [option for option, value in others.items() if value is not None])
     fixed.check_backend(backend)
     output.check(name, *source.files)

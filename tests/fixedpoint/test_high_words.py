@@ -1,0 +1,109 @@
+"""Sums of products are narrowed to their high words: what that may cost in error, and what it takes."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+import numpy as np
+import pytest
+
+import strapgen
+from strapgen import catalogue, fixedpoint, pipeline
+from strapgen.fixedpoint import quantization
+from strapgen.fixedpoint.high_words import in_order
+from strapgen.ir.fixed_settings import Settings
+from strapgen.ir.integer_program import FixedProgram, IntegerSum, Value, used_by
+
+RATES = {"max_rate_deg_s": 400, "step": "0.01"}
+
+
+def quantized(algorithm: str, **settings: object) -> FixedProgram:
+    program = pipeline.program(catalogue.choose_step(algorithm, "rk4", 2))
+    return fixedpoint.quantize(program, Settings.of(increments=2, **RATES, **settings))
+
+
+def in_units(fixed: FixedProgram) -> Fraction:
+    (result,) = fixed.interface.outputs
+    return max(result.errors) / result.format.unit
+
+
+def sums(fixed: FixedProgram) -> list[Value]:
+    """Return the values that are narrowed from sums of products."""
+    return [
+        value
+        for value in fixed.body
+        if isinstance(value.definition, IntegerSum)
+        and value.definition.shift
+        and any(len(term.names) == 2 for term in value.definition.fine)
+    ]
+
+
+def test_every_narrowing_of_a_step_but_the_cross_product_is_by_a_word():
+    narrowed = {value.name: value.definition.shift for value in sums(quantized("euler"))}
+    finer = {name: shift for name, shift in narrowed.items() if shift < 32}
+    assert finer.keys() == {f"sigma_cross_d1_{axis}" for axis in "xyz"}
+    assert len(narrowed) == 13
+
+
+def test_the_products_of_a_sum_lie_at_one_place():
+    for value in sums(quantized("euler")):
+        assert {term.shift for term in value.definition.fine if len(term.names) == 2} == {0}
+
+
+@pytest.mark.parametrize("algorithm", ["euler", "dcm"])
+@pytest.mark.parametrize("word", [16, 32])
+@pytest.mark.parametrize("carry", ["none", "full"])
+def test_the_error_is_at_most_a_sixtieth_above_that_of_other_formats(algorithm, word, carry, monkeypatch):
+    narrowed = quantized(algorithm, word=word, carry=carry)
+    monkeypatch.setattr(quantization, "_high_words", lambda *_: None)
+    other = quantized(algorithm, word=word, carry=carry)
+    assert in_units(narrowed) <= in_units(other) * Fraction(61, 60)
+    assert sum(narrowed.operations.values()) <= sum(other.operations.values())
+    if carry != "none":  # what adds up in a run
+        names = [name for name in ("p_x", "p_s", "A_11", "A_12") if name in narrowed.formats]
+        errors = [{value.name: value.error for value in fixed.body} for fixed in (narrowed, other)]
+        assert names and all(errors[0][name] <= errors[1][name] * Fraction(61, 60) for name in names)
+
+
+def test_a_step_in_euler_parameters_is_certified_to_58_hundredths_of_a_unit():
+    assert in_units(quantized("euler")) < Fraction(58, 100)
+
+
+def test_what_is_rounded_down_counts_a_whole_unit():
+    fixed = quantized("euler")
+    down = [
+        value for value in fixed.body if isinstance(value.definition, IntegerSum) and value.definition.down
+    ]
+    assert {"sigma_dot_sigma", "p_sigma", "d1_dot_d2"} <= {value.name for value in down}
+    for value in down:
+        assert value.error >= Fraction(1, 1 << value.fraction)
+
+
+@pytest.mark.parametrize("algorithm", ["euler", "dcm"])
+def test_errors_of_calls_lie_inside_the_certified_bound(algorithm, rng):
+    settings = Settings.of(increments=2, **RATES)
+    step = strapgen.backend(algorithm, "rk4", 2, "c-fixed32", settings=settings)
+    exact = strapgen.backend(algorithm, "rk4", 2, "numpy")
+    unit = float(step.interface.outputs[0].format.unit)
+    increments = step.representable(rng.choice([-0.0349, 0.0349], (400, 2, 3)))
+    start = np.eye(3) if algorithm == "dcm" else np.array([0.5, -0.5, 0.5, 0.5])
+    states = np.broadcast_to(start, (len(increments), *start.shape))
+    worst = float(np.abs(step.step(states, increments) - exact.step(states, increments)).max())
+    assert 0.3 < worst / unit <= float(in_units(quantized(algorithm)))
+
+
+def test_the_order_of_the_code_computes_each_value_before_its_use():
+    fixed = quantized("dcm")
+    known = {name for argument in fixed.interface.inputs for name in argument.signal.elements}
+    for value in fixed.body:
+        assert known.issuperset(used_by(value))
+        known.add(value.name)
+    names = [value.name for value in fixed.body]
+    mixed = in_order(fixed.body, fixed.interface.outputs[0].values[::-1], [])
+    assert sorted(value.name for value in mixed) == sorted(names)
+
+
+def test_numbers_without_a_bound_to_hold_keep_their_formats():
+    program = pipeline.program(catalogue.choose("euler-from-cayley-klein"))
+    fixed = fixedpoint.quantize(program, Settings())
+    assert not any(isinstance(v.definition, IntegerSum) and v.definition.down for v in fixed.body)
