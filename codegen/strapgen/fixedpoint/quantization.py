@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Container, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Container, Hashable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 
@@ -19,7 +19,14 @@ from strapgen.fixedpoint.format_plan import (
     sums_of_inputs_are_exact,
 )
 from strapgen.fixedpoint.high_words import high_words, in_order, with_exact_parts_apart
-from strapgen.fixedpoint.integer_sums import HighWords, Quantization, integer_value, lower_sum, word_of
+from strapgen.fixedpoint.integer_sums import (
+    HighWords,
+    Lowered,
+    Quantization,
+    integer_value,
+    lower_sum,
+    word_of,
+)
 from strapgen.fixedpoint.intervals import Interval
 from strapgen.fixedpoint.quantities import (
     ExactOperation,
@@ -101,8 +108,10 @@ def _high_words(
     limited = outputs if settings.carry == "none" else [*outputs, *transition]
     limits = {name: other.values[name].error * _NARROWED for name in limited if name in other.values}
 
+    known: dict[Hashable, Lowered] = {}
+
     def walk(some: Quantities, most: Mapping[str, int], high: HighWords) -> Quantization:
-        return _walk(program, settings, some, plan, most, high)
+        return _walk(program, settings, some, plan, most, high, known)
 
     try:
         narrowed = high_words(walk, with_exact_parts_apart(quantities, plan.words), limits)
@@ -153,10 +162,13 @@ def _walk(
     plan: FormatPlan,
     most: Mapping[str, int],
     high: HighWords | None = None,
+    known: dict[Hashable, Lowered] | None = None,
 ) -> Quantization:
     """Lower the quantities one by one, and return the final state of the walk."""
     names = _feedback_names(program, settings, quantities)
-    context = Quantization(program, settings, quantities, plan, most, names, high)
+    context = Quantization(
+        program, settings, quantities, plan, most, names, high, {} if known is None else known
+    )
     for quantity in quantities.items.values():
         match quantity.definition:
             case Sum() as total if not _is_unused_constant(context, quantity, total):
