@@ -24,14 +24,13 @@ def quantize(program: Program, settings: Settings) -> FixedProgram:
         raise InputError(f"{program.kernel} takes no increments; {what} does not go with it")
     counts = program if settings.sensor is None else in_counts(program, settings.sensor)
     try:
-        fixed = lowered(counts, settings)
         series = without_roots(counts, settings)
         if series is not counts:
             with suppress(InputError):  # a word is too short for it
-                other = lowered(series, settings)
-                if all(other.error_bounds[name] <= error for name, error in fixed.error_bounds.items()):
-                    fixed = other
-        return replace(fixed, program=program)
+                one, other = (lowered(code, settings, high=False).error_bounds for code in (counts, series))
+                if all(other[name] <= error for name, error in one.items()):
+                    return replace(lowered(series, settings), program=program)
+        return replace(lowered(counts, settings), program=program)
     except InputError:
         raise
     except (ValueError, ArithmeticError) as error:  # a proof fails, as where a divisor may be zero

@@ -62,8 +62,11 @@ _WORSE = Fraction(101, 100)
 _NARROWED = Fraction(61, 60)
 
 
-def lowered(program: Program, settings: Settings) -> FixedProgram:
-    """Lower a program to integers; parameters and errors are those of `strapgen.fixedpoint.quantize`."""
+def lowered(program: Program, settings: Settings, high: bool = True) -> FixedProgram:
+    """Lower a program to integers; parameters and errors are those of `strapgen.fixedpoint.quantize`.
+
+    Without `high`, no sums are narrowed to high words, which takes most of the time to find.
+    """
     quantities, plan = _plan(program, settings)
     finest = _walk(program, settings, quantities, plan, {})
     coarser = aligning(finest.body, finest.values, plan.forced)
@@ -72,7 +75,7 @@ def lowered(program: Program, settings: Settings) -> FixedProgram:
     aligned = _fixed_program(shorter)
     if not _is_worse(aligned, fixed):
         context, fixed = shorter, aligned
-    if not settings.digits:
+    if high and not settings.digits:
         narrowed = _high_words(program, settings, quantities, plan, context)
         if narrowed is not None:
             program_of = _fixed_program(narrowed)
