@@ -140,8 +140,8 @@ int cayley_klein_rk4_2_w32(const int32_t state[4], const int32_t increments[6], 
     }
     const int32_t d1_dot_d2 = cayley_klein_rk4_2_w32_fit(cayley_klein_rk4_2_w32_mul(d1_x, d2_x)
         + cayley_klein_rk4_2_w32_mul(d1_y, d2_y)
-        + cayley_klein_rk4_2_w32_mul(d1_z, d2_z), 29);
-        /* Q-4.35, -0.0469 .. 0.0469, error 3e-11 */
+        + cayley_klein_rk4_2_w32_mul(d1_z, d2_z), 32);
+        /* Q-1.32, -0.0469 .. 0.0469, error 2.4e-10 */
     /* the angle increment of the whole step */
     const int32_t sigma_x = d1_x + d2_x; /* Q-1.32, -0.25 .. 0.25, exact */
     const int32_t sigma_y = d1_y + d2_y; /* Q-1.32, -0.25 .. 0.25, exact */
@@ -153,12 +153,12 @@ int cayley_klein_rk4_2_w32(const int32_t state[4], const int32_t increments[6], 
         + (INT16_C(1) << 4), 5); /* Q-4.35, -2.92e-11 .. 0.00147, error 1.6e-11 */
     const int32_t p_s_factor = -p_s_factor_part
         + cayley_klein_rk4_2_w32_near(cayley_klein_rk4_2_w32_mul(d1_dot_d2,
-        INT32_C(178956971) /* 1/24 in Q32 */));
-        /* Q-4.35, -0.00196 .. 0.00123, error 3.5e-11; stores p_s_factor + 1/8 */
+        INT32_C(1431655765) /* 1/24 in Q35 */));
+        /* Q-4.35, -0.00196 .. 0.00123, error 4e-11; stores p_s_factor + 1/8 */
     /* its scalar part */
     const int32_t p_s = cayley_klein_rk4_2_w32_asr(cayley_klein_rk4_2_w32_fit(
         cayley_klein_rk4_2_w32_mul(p_s_factor, sigma_dot_sigma), 32) - sigma_dot_sigma
-        + 4, 3); /* Q-2.33, -0.0239 .. 0.000229, error 7.3e-11; stores p_s - 1 */
+        + 4, 3); /* Q-2.33, -0.0239 .. 0.000229, error 7.4e-11; stores p_s - 1 */
     /* weight of sigma in p */
     const int32_t p_sigma = cayley_klein_rk4_2_w32_fit(cayley_klein_rk4_2_w32_mul(
         sigma_dot_sigma, (-INT32_C(1431655765)) /* -1/48 in Q36 */)

@@ -163,18 +163,18 @@ int euler_rk4_2_w32(const int32_t state[4], const int32_t increments[6], int32_t
         + euler_rk4_2_w32_mul(p_sigma_cross_d1, sigma_cross_d1_x), 32) + 2, 2);
         /* Q-2.33, -0.137 .. 0.137, error 7.1e-11 */
     const int32_t d1_dot_d2 = euler_rk4_2_w32_fit(euler_rk4_2_w32_mul(d1_x, d2_x)
-        + euler_rk4_2_w32_mul(d1_y, d2_y) + euler_rk4_2_w32_mul(d1_z, d2_z), 29);
-        /* Q-4.35, -0.0469 .. 0.0469, error 3e-11 */
+        + euler_rk4_2_w32_mul(d1_y, d2_y) + euler_rk4_2_w32_mul(d1_z, d2_z), 32);
+        /* Q-1.32, -0.0469 .. 0.0469, error 2.4e-10 */
     const int32_t p_s_factor_part = euler_rk4_2_w32_asr(sigma_dot_sigma + (INT16_C(1) << 4), 5);
         /* Q-4.35, -2.92e-11 .. 0.00147, error 1.6e-11 */
     const int32_t p_s_factor = -p_s_factor_part
         + euler_rk4_2_w32_near(euler_rk4_2_w32_mul(d1_dot_d2,
-        INT32_C(178956971) /* 1/24 in Q32 */));
-        /* Q-4.35, -0.00196 .. 0.00123, error 3.5e-11; stores p_s_factor + 1/8 */
+        INT32_C(1431655765) /* 1/24 in Q35 */));
+        /* Q-4.35, -0.00196 .. 0.00123, error 4e-11; stores p_s_factor + 1/8 */
     /* its scalar part */
     const int32_t p_s = euler_rk4_2_w32_asr(euler_rk4_2_w32_fit(euler_rk4_2_w32_mul(p_s_factor,
         sigma_dot_sigma), 32) - sigma_dot_sigma + 4, 3);
-        /* Q-2.33, -0.0239 .. 0.000229, error 7.3e-11; stores p_s - 1 */
+        /* Q-2.33, -0.0239 .. 0.000229, error 7.4e-11; stores p_s - 1 */
     const int32_t sigma_cross_d1_z = euler_rk4_2_w32_fit(euler_rk4_2_w32_mul(d1_y, sigma_x)
         + euler_rk4_2_w32_nml(sigma_y, d1_x) + (INT32_C(1) << 28), 29);
         /* Q-4.35, -0.0313 .. 0.0313, error 1.5e-11 */

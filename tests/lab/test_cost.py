@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from commands import run
 
-from strapgen import pipeline
+from strapgen import catalogue, pipeline
 from strapgen.cli import main
 from strapgen.ir.exceptions import CompilerError, InputError
 from strapgen.ir.fixed_settings import Settings
@@ -29,6 +29,8 @@ EXECUTED = {
 #: Instructions of a call on a Cortex-M3 that takes the counts of a gyro: a tenth more than 226, which the step on
 #: angles took once, and for direction cosines 15 % more than 520.
 COUNTS = {"euler": 248, "dcm": 598}
+#: Instructions of a step by a window of seven samples on either side on a Cortex-M3.
+WINDOW = 1250
 
 HOST = Runner("host", ("cc",), ("env",), "cc", "gcc")
 
@@ -65,6 +67,14 @@ def test_counts_of_a_gyro_cost_little_more_than_angles(kernel):
     settings = Settings.of(max_rate_deg_s=400, sample_hz=100, increments=2, lsb="0.0175dps")
     sources = pipeline.generate(pipeline.lower(pipeline.derive(kernel)), "c-fixed", settings)
     assert cost.cost(sources, "cortex-m3").executed <= COUNTS[kernel]
+
+
+@pytest.mark.long
+def test_a_step_by_a_window_executes_few_instructions():
+    needed("cortex-m3")
+    settings = Settings.of(max_rate_deg_s=400, step="0.01", increments=1)
+    sources = pipeline.compile(catalogue.choose_step("euler", "window-7-7", None), "c-fixed", settings)
+    assert 500 < cost.cost(sources, "cortex-m3").executed <= WINDOW
 
 
 def test_the_command_prints_its_json_keys(capsys):

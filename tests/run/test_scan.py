@@ -138,6 +138,16 @@ def test_a_large_history_that_is_streamed_has_the_bits_of_its_parts(target, rng)
     assert backend.propagate(samples, out=inside).tobytes() == history.tobytes()
 
 
+@pytest.mark.parametrize("place", [3, BLOCK + 50, 3 * BLOCK + 1])
+@pytest.mark.parametrize("value", [np.nan, np.inf])
+def test_a_sample_that_is_not_finite_is_named(scan, value, place, rng):
+    samples = samples_of(scan, rng, 3 * BLOCK + 2)
+    samples[place, 1, 0] = value
+    for every in (1, BLOCK, len(samples) - 1):
+        with pytest.raises(InputError, match=rf"^samples holds {value} at index \({place}, 1, 0\); "):
+            scan.propagate(samples, every)
+
+
 def test_a_copy_in_another_process_keeps_the_order(target):
     backend = strapgen.backend("euler", backend=target, order="scan")
     assert pickle.loads(pickle.dumps(backend)).order == "scan"

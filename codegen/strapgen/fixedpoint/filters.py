@@ -40,19 +40,26 @@ def nearest_word(value: Fraction, word: int) -> Factor:
 
 
 def filter_words(
-    quantities: Quantities, inputs: Sequence[Signal], definition: Sum, word: int
+    quantities: Quantities,
+    inputs: Sequence[Signal],
+    definition: Sum,
+    word: int,
+    fractions: Mapping[str, int] | None = None,
 ) -> Mapping[Monomial, Factor]:
-    """Return the words for the coefficients of a sum that filters samples; an empty mapping for any other sum."""
+    """Return the words for the coefficients of a sum that filters samples; an empty mapping for any other sum.
+
+    With the fraction bits of the samples, all products have the same.
+    """
     linear = [(monomial, c) for monomial, c in definition.terms if len(monomial) == 1]
     if sum(not is_power_of_two(c) for _, c in linear) < _FEWEST:
         return {}
-    places = {
+    samples = {
         element: (signal.name, number // 3, number % 3)
         for signal in inputs
         if len(signal.shape) == 2 and signal.shape[1] == 3 and not signal.constraint
         for number, element in enumerate(signal.elements)
     }
-    shares = [_weights(quantities, places, monomial[0]) for monomial, _ in linear]
+    shares = [_weights(quantities, samples, monomial[0]) for monomial, _ in linear]
     axes = {place[::2] for share in shares for place in share}
     if len(axes) != 1 or not all(shares):
         return {}
@@ -63,7 +70,17 @@ def filter_words(
         )
         for share in shares
     )
-    words = rounded_together(tuple(c for _, c in linear), moments, word)
+    most: tuple[int, ...] = ()
+    if fractions is not None:
+        places = [longest(c, word) + fractions[monomial[0]] for monomial, c in linear]
+        top = min(p for p, (_, c) in zip(places, linear, strict=True) if not is_power_of_two(c))
+        most = tuple(top - fractions[monomial[0]] for monomial, _ in linear)
+    words = rounded_together(tuple(c for _, c in linear), moments, word, most)
+    if most:  # the zeros at the end of a coefficient stay
+        words = tuple(
+            factor if is_power_of_two(c) else (factor[0] << (bits - factor[1]), bits)
+            for factor, bits, (_, c) in zip(words, most, linear, strict=True)
+        )
     return {monomial: one for (monomial, c), one in zip(linear, words, strict=True) if not is_power_of_two(c)}
 
 
@@ -84,18 +101,18 @@ def _weights(
 
 @lru_cache(maxsize=256)
 def rounded_together(
-    coefficients: tuple[Fraction, ...], moments: tuple[Moments, ...], word: int
+    coefficients: tuple[Fraction, ...], moments: tuple[Moments, ...], word: int, most: tuple[int, ...] = ()
 ) -> tuple[Factor, ...]:
     """Return coefficients as words whose sums with the moments are exact, or as near as their units allow.
 
     Powers of two are exact. Two of the other coefficients take up the rounding errors of all: those with which the
-    errors are smallest.
+    errors are smallest. `most` are the fraction bits of each at most.
 
     >>> thirds = (Fraction(-1, 3), Fraction(2, 3), Fraction(-1, 3))
     >>> rounded_together(thirds, tuple((Fraction(1), Fraction(k)) for k in range(3)), 8)
     ((-85, 8), (85, 7), (-85, 8))
     """
-    filter_ = _Filter(coefficients, moments, word)
+    filter_ = _Filter(coefficients, moments, word, most)
     return min(filter_.candidates(), key=filter_.cost)
 
 
@@ -106,10 +123,13 @@ class _Filter:
     coefficients: tuple[Fraction, ...]
     moments: tuple[Moments, ...]
     word: int
+    most: tuple[int, ...] = ()
 
     def candidates(self) -> Iterator[tuple[Factor, ...]]:
         """Yield the coefficients rounded one by one, and with each two of them changed."""
         places = [longest(c, self.word) for c in self.coefficients]
+        if self.most:
+            places = [min(pair) for pair in zip(places, self.most, strict=True)]
         yield tuple(_short(self._integer(k, place), place) for k, place in enumerate(places))
         free = [k for k, c in enumerate(self.coefficients) if not is_power_of_two(c)]
         for pair in combinations(free, 2):

@@ -95,19 +95,27 @@ def high_words(walk: Walk, quantities: Quantities, limits: Mapping[str, Fraction
     if not all(limits.values()) or not any(_may_change(context, value) for value in context.body):
         return None
     refused: set[frozenset[str]] = set()
+    taken: list[tuple[frozenset[str], bool]] = []
     for _ in range(_MOST_CHOICES):
         excess = _excess(context, limits)
         if not excess:
-            return _rounded_down(walk, context, limits)
+            break
         steps = _steps(context, limits, excess, refused)
         if not steps:
             break
         other = _at_one_place(walk, quantities, _with(context.high, steps))
         if sum(_excess(other, limits).values()) < sum(excess.values()):
-            context = other
+            context, taken = other, taken + steps
         else:  # it brings the products of other sums to a coarser place
             refused.add(steps[0][0])
-    return None
+    if _excess(context, limits):
+        return None
+    for step in list(taken):  # what was refined early may do without, after others were
+        fewer = [one for one in taken if one != step]
+        other = _at_one_place(walk, quantities, _with(None, fewer))
+        if not _excess(other, limits):
+            context, taken = other, fewer
+    return _rounded_down(walk, context, limits)
 
 
 def _with(high: HighWords | None, steps: Iterable[tuple[frozenset[str], bool]]) -> HighWords:

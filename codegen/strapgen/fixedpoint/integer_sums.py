@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 
@@ -53,6 +53,16 @@ class HighWords:
     down: frozenset[str] = frozenset()  # values rounded down, which takes no instruction
 
 
+@dataclass(frozen=True)
+class Lowered:
+    """What came of a sum: its value, those that it added before, and the formats wanted of its factors."""
+
+    value: Value
+    added: tuple[Value, ...]
+    wanted: Mapping[str, int]
+    factors: tuple[Value | None, ...]  # kept, as they are told apart by identity
+
+
 @dataclass
 class Quantization:
     """The state of a walk over the exact quantities of a program."""
@@ -64,6 +74,8 @@ class Quantization:
     most: Mapping[str, int]  # most fraction bits of quantities that need not be finer
     feedback_names: Mapping[str, str]  # error feedbacks by the quantity whose rounding error they hand on
     high: HighWords | None = None  # the choices where sums are narrowed to their high words
+    #: What came of sums in walks with other choices, which the same sum of the same values takes again.
+    known: dict[Hashable, Lowered] = field(default_factory=dict)
     word: int = field(init=False)  # bits
     rounding_error: Fraction = field(init=False)  # largest error of a rounding, in units of the last place
     values: dict[str, Value] = field(init=False)  # the integers so far, those of the inputs included
@@ -195,9 +207,7 @@ def _lower(context: Quantization, quantity: Quantity, definition: Sum) -> Value:
     is_word = quantity.name in context.plan.words
     checked = quantity.range_checked or quantity.name in context.feedback_names
     if context.high is not None and not checked:
-        if is_word:
-            return _narrowed(context, context.high, quantity, definition, followed)
-        return _unrounded(context, quantity, definition, followed)
+        return _lowered_again(context, context.high, quantity, definition, followed, is_word)
     terms = _integer_terms(context, definition)
     if not is_word:
         return _wide(context, quantity, terms, followed)
@@ -214,6 +224,40 @@ def _lower(context: Quantization, quantity: Quantity, definition: Sum) -> Value:
     return value
 
 
+def _lowered_again(
+    context: Quantization,
+    high: HighWords,
+    quantity: Quantity,
+    definition: Sum,
+    followed: Fraction,
+    is_word: bool,
+) -> Value:
+    """Return the integer of a sum, that of an earlier walk where its values, formats and choices are the same."""
+    name, values = quantity.name, context.values
+    used = list(dict.fromkeys(factor for monomial, _ in definition.terms for factor in monomial))
+    factors = tuple(values.get(one) for factor in used for one in (factor, f"{factor}_word"))
+    down = frozenset(one for one in high.down if one == name or one.startswith(f"{name}_part"))
+    kept = high.kept.intersection(used)
+    choices = name in high.fine, down, kept, context.most.get(name), followed
+    key = (name, choices, *map(id, factors))
+    known = context.known.get(key)
+    if known is None:
+        wanted, before = context.wanted, len(context.body)
+        context.wanted = {}
+        if is_word:
+            value = _narrowed(context, high, quantity, definition, followed)
+        else:
+            value = _unrounded(context, quantity, definition, followed)
+        known = Lowered(value, tuple(context.body[before:]), context.wanted, factors)
+        context.known[key], context.wanted = known, wanted
+    else:
+        for value in known.added:
+            context.add(value)
+    for one, bits in known.wanted.items():
+        context.wanted[one] = min(bits, context.wanted.get(one, bits))
+    return known.value
+
+
 @dataclass
 class _Gathered:
     """The terms of a sum by how they can be brought to a place."""
@@ -227,9 +271,13 @@ class _Gathered:
     constant: Fraction = Fraction(0)
 
 
-def _gathered(context: Quantization, definition: Sum) -> _Gathered:
+def _gathered(context: Quantization, name: str, definition: Sum) -> _Gathered:
     """Return the terms of a sum by how they can be brought to a place."""
-    words = filter_words(context.quantities, context.program.inputs, definition, context.word)
+    linear = [monomial for monomial, _ in definition.terms if len(monomial) == 1]
+    # A filter that is fine keeps the longest coefficients, whose products lie at several places.
+    fine = context.high is not None and name in context.high.fine
+    fractions = None if fine else {factor: context.values[factor].fraction for (factor,) in linear}
+    words = filter_words(context.quantities, context.program.inputs, definition, context.word, fractions)
     terms = _Gathered()
     for monomial, coefficient in definition.terms:
         if not monomial:
@@ -264,7 +312,7 @@ def _top(context: Quantization, definition: Sum, terms: _Gathered, fraction: int
 
 def _unrounded(context: Quantization, quantity: Quantity, definition: Sum, followed: Fraction) -> Value:
     """Return a sum that no word is needed of, with its products at one place."""
-    terms = _gathered(context, definition)
+    terms = _gathered(context, quantity.name, definition)
     top = _top(context, definition, terms, 0)
     placed = [*terms.products, *(item for *_, item in terms.shifted)]
     if top is None:
@@ -289,7 +337,7 @@ def _narrowed(
 ) -> Value:
     """Return the integer of a sum whose products lie at one place, a word above that of the result."""
     name, word, forced = quantity.name, context.word, quantity.name in context.plan.forced
-    terms = _gathered(context, definition)
+    terms = _gathered(context, quantity.name, definition)
     natural = finest(quantity.range.magnitude, word)
     fraction = context.plan.forced.get(name, min(natural, context.most.get(name, natural)))
     top = _top(context, definition, terms, fraction)
