@@ -18,6 +18,7 @@ from strapgen.fixedpoint import bounded_series
 from strapgen.fixedpoint.bounded_series import SHARE, with_declared_ranges
 from strapgen.fixedpoint.floating import rounding_bounds
 from strapgen.fixedpoint.floating.errors import NUMBERS
+from strapgen.fixedpoint.quantization import lowered
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.program import OPERATIONS, Constant, Node, Operation, Program
@@ -234,3 +235,78 @@ def test_the_command_line_declares_a_range_and_verifies_it(tmp_path, capsys):
     assert status == 0 and "return what they must" in said
     status, _, refused = says(f"{words} --word 32", capsys)
     assert status == 2 and refused.startswith("strapgen: the options of fixed point go with --target c-fixed")
+
+
+#: An operation on what stays near 1, and its exponent.
+POWERS = {
+    "root": (node("sqrt", "square"), Fraction(1, 2)),
+    "inverse root": (node("divide", 1, "length"), Fraction(-1, 2)),
+    "inverse": (node("divide", 1, "square"), Fraction(-1)),
+}
+
+
+def power_near_one(value: Operation) -> Program:
+    """Return an operation on 1 + x^2 - y^2 / 2, or on its root."""
+    square = node("add", 1, node("subtract", node("multiply", "x", "x"), node("multiply", "z", "y")))
+    body = {"z": node("multiply", Fraction(1, 2), "y"), "square": square}
+    return program(body | {"length": node("sqrt", "square"), "p": value}, {"x": 1, "y": 1}, "p")
+
+
+@pytest.mark.parametrize("largest", ["0.001", "0.03", "0.12"])
+@pytest.mark.parametrize("number", NUMBERS)
+@pytest.mark.parametrize("name", POWERS)
+def test_powers_of_what_stays_near_one_are_series_to_fifty_digits(name, number, largest):
+    value_, exponent = POWERS[name]
+    most = Fraction(largest)
+    made = with_declared_ranges(power_near_one(value_), Settings(ranges={"x": most, "y": most}), number)
+    (series,) = (a for a in made.body if a.remainder)
+    assert not made.operations["sqrt"] and not made.operations["divide"]
+    with mpmath.workdps(50):
+        ends = (-(most**2) / 2, most**2)
+        places = [mpmath.mpf(u.numerator * k) / u.denominator / 32 for u in ends for k in range(33)]
+        power = mpmath.mpf(exponent.numerator) / exponent.denominator
+        worst = max(abs(value(series.value, u) - (1 + u) ** power) for u in places)
+        assert worst <= mpmath.mpf(series.remainder.numerator) / series.remainder.denominator
+    assert series.remainder <= SHARE * NUMBERS[number].unit
+    assert float(worst) > 0.5 * float(series.remainder)
+
+
+def test_powers_that_need_many_terms_keep_their_operations():
+    for value_, _ in POWERS.values():
+        wide = with_declared_ranges(
+            power_near_one(value_), Settings(ranges=dict.fromkeys("xy", Fraction(2, 3)))
+        )
+        assert wide.operations["sqrt"] + wide.operations["divide"] > 0
+        assert not any(a.remainder for a in wide.body)
+
+
+def test_a_quotient_by_a_root_is_a_product_with_its_inverse():
+    code = power_near_one(node("divide", "x", "length"))
+    made = with_declared_ranges(code, Settings(ranges=dict.fromkeys("xy", Fraction(1, 10))))
+    assert made.operations["sqrt"] == made.operations["divide"] == 0
+    (true,), (found,) = (exactly(one, {"x": 0.1, "y": -0.05})["out"] for one in (code, made))
+    assert 0 < abs(true - found) <= max(a.remainder for a in made.body)
+
+
+def test_exact_steps_normalize_by_a_series():
+    step = pipeline.program(catalogue.choose("euler", "taylor3", 3))
+    made = with_declared_ranges(step, Settings.of(largest_angle="0.004"))
+    assert step.operations["sqrt"] == step.operations["divide"] == 1
+    assert made.operations["sqrt"] == made.operations["divide"] == 0
+
+
+def test_fixed_point_normalizes_by_a_series_where_that_costs_no_error(rng):
+    step = pipeline.program(catalogue.choose("euler", "taylor3", 3))
+    settings = Settings.of(largest_angle="0.01")
+    made = strapgen.quantize(step, settings)
+    assert not made.operations.get("sqrt") and not made.operations.get("divide")
+    assert made.program == step  # the contract is that of the closed form
+    assert made.error_bounds["next"] < lowered(step, settings).error_bounds["next"]
+    model = strapgen.build(strapgen.generate(made, "fixed-model"))
+    increments = model.representable(rng.choice([-0.01, 0.01], (8, 3, 3)) * 0.999)
+    state = np.array([0.5, -0.5, 0.5, 0.5])
+    names = [element for signal in step.inputs for element in signal.elements]
+    for angles in increments:
+        exact = exactly(step, dict(zip(names, [*state, *angles.ravel()], strict=True)))["next"]
+        for found, true in zip(model.step(state, angles), exact, strict=True):
+            assert abs(Fraction(float(found)) - true) <= made.error_bounds["next"]

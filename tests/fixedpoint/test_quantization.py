@@ -12,10 +12,10 @@ from small_integers import GRID, Known, Worst, at_corners, context, quantity, wo
 from small_programs import node, program
 
 from strapgen import quantize
+from strapgen.fixedpoint.format_plan import MOST_GUARD_BITS
 from strapgen.fixedpoint.integer_sums import integer_value
 from strapgen.fixedpoint.quantities import ExactOperation, Quantities, Sum
 from strapgen.fixedpoint.quantization import (
-    _MOST_GUARD_BITS,
     _errors,
     _is_worse,
     _output,
@@ -67,13 +67,13 @@ def test_an_output_has_the_range_of_all_of_its_elements_and_one_format():
         _output(context, signal)
 
 
-@pytest.mark.parametrize("bits", [1, _MOST_GUARD_BITS, _MOST_GUARD_BITS + 1])
+@pytest.mark.parametrize("bits", [1, MOST_GUARD_BITS, MOST_GUARD_BITS + 1])
 def test_inputs_have_up_to_so_many_bits_less_that_their_sum_is_exact(bits):
     largest = {"a": Fraction(1, 2), "b": Fraction(1, 2) / 2**bits}
     code = program({"s": node("add", "a", "b"), "y": node("multiply", "s", "s")}, largest)
     b = quantize(code, Settings(16)).interface.inputs[1]
     # The sum, of 1/2 to 1, has 15 places; an input of up to 1/2 has as many, and a smaller one more.
-    assert b.format.fraction == (15 if bits <= _MOST_GUARD_BITS else 15 + bits)
+    assert b.format.fraction == (15 if bits <= MOST_GUARD_BITS else 15 + bits)
 
 
 @pytest.mark.parametrize(("percent", "worse"), [(100, False), (101, False), (102, True)])

@@ -1,5 +1,6 @@
 """`quantize` turns a program into integer code with proved ranges and certified error bounds."""
 
+from contextlib import suppress
 from dataclasses import replace
 
 from strapgen.ir.exceptions import InputError
@@ -14,6 +15,7 @@ __all__ = ["OPERATIONS", "FixedProgram", "Format", "Interface", "Settings", "can
 
 def quantize(program: Program, settings: Settings) -> FixedProgram:
     """Lower a program to integers."""
+    from strapgen.fixedpoint.bounded_series import without_roots
     from strapgen.fixedpoint.quantization import lowered
     from strapgen.fixedpoint.sensor_scale import counted, in_counts
 
@@ -22,6 +24,12 @@ def quantize(program: Program, settings: Settings) -> FixedProgram:
         raise InputError(f"{program.kernel} takes no increments; {what} does not go with it")
     counts = program if settings.sensor is None else in_counts(program, settings.sensor)
     try:
+        series = without_roots(counts, settings)
+        if series is not counts:
+            with suppress(InputError):  # a word is too short for it
+                one, other = (lowered(code, settings, high=False).error_bounds for code in (counts, series))
+                if all(other[name] <= error for name, error in one.items()):
+                    return replace(lowered(series, settings), program=program)
         return replace(lowered(counts, settings), program=program)
     except InputError:
         raise

@@ -26,6 +26,9 @@ from strapgen.ir.program import Program, Result
 from strapgen.ir.signals import Signal
 from strapgen.ir.units import Sensor
 
+#: Bits that inputs may be stored below their finest format, so that sums of them are exact.
+MOST_GUARD_BITS = 3
+
 
 @dataclass(frozen=True)
 class FormatPlan:

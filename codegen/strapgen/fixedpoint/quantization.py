@@ -10,7 +10,14 @@ from fractions import Fraction
 from strapgen.fixedpoint import derivation
 from strapgen.fixedpoint.accumulation import accumulation, step_errors
 from strapgen.fixedpoint.angle_accumulation import angle_accumulation
-from strapgen.fixedpoint.format_plan import FormatPlan, Limit, format_plan, limits, sums_of_inputs_are_exact
+from strapgen.fixedpoint.format_plan import (
+    MOST_GUARD_BITS,
+    FormatPlan,
+    Limit,
+    format_plan,
+    limits,
+    sums_of_inputs_are_exact,
+)
 from strapgen.fixedpoint.high_words import high_words, in_order, with_exact_parts_apart
 from strapgen.fixedpoint.integer_sums import (
     HighWords,
@@ -49,16 +56,17 @@ from strapgen.ir.interfaces import Argument, ErrorFeedback, Interface
 from strapgen.ir.program import Program, Result
 from strapgen.ir.signals import CYCLE, Signal
 
-#: Bits that inputs may be stored below their finest format, so that sums of them are exact.
-_MOST_GUARD_BITS = 3
 #: Shorter formats are chosen where they cost no more than a hundredth in error.
 _WORSE = Fraction(101, 100)
 #: High words are taken where they cost no more than a sixtieth in error.
 _NARROWED = Fraction(61, 60)
 
 
-def lowered(program: Program, settings: Settings) -> FixedProgram:
-    """Lower a program to integers; parameters and errors are those of `strapgen.fixedpoint.quantize`."""
+def lowered(program: Program, settings: Settings, high: bool = True) -> FixedProgram:
+    """Lower a program to integers; parameters and errors are those of `strapgen.fixedpoint.quantize`.
+
+    Without `high`, no sums are narrowed to high words, which takes most of the time to find.
+    """
     quantities, plan = _plan(program, settings)
     finest = _walk(program, settings, quantities, plan, {})
     coarser = aligning(finest.body, finest.values, plan.forced)
@@ -67,7 +75,7 @@ def lowered(program: Program, settings: Settings) -> FixedProgram:
     aligned = _fixed_program(shorter)
     if not _is_worse(aligned, fixed):
         context, fixed = shorter, aligned
-    if not settings.digits:
+    if high and not settings.digits:
         narrowed = _high_words(program, settings, quantities, plan, context)
         if narrowed is not None:
             program_of = _fixed_program(narrowed)
@@ -110,7 +118,7 @@ def _high_words(
 
     try:
         narrowed = high_words(walk, with_exact_parts_apart(quantities, plan.words), limits)
-    except InputError:  # a word is too short
+    except (InputError, ArithmeticError):  # a word is too short, or a coarse divisor may be zero
         return None
     if narrowed is not None:
         narrowed.body = in_order(narrowed.body, outputs, transition)
@@ -124,7 +132,7 @@ def _plan(program: Program, settings: Settings) -> tuple[Quantities, FormatPlan]
     # What is handed on from call to call keeps its finest format: it is no increment.
     if program.recursion is not None or sums_of_inputs_are_exact(first[1], first[0], settings.word):
         return first
-    for guard_bits in range(1, _MOST_GUARD_BITS + 1):
+    for guard_bits in range(1, MOST_GUARD_BITS + 1):
         quantities, plan = _with_guard_bits(program, settings, stated, guard_bits)
         if sums_of_inputs_are_exact(plan, quantities, settings.word):
             return quantities, plan

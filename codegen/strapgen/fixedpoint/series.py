@@ -162,6 +162,27 @@ def sine_series(first: int, reach: Fraction, tolerance: Fraction) -> tuple[tuple
     return tuple(coefficients), reach**degree / math.factorial(degree)
 
 
+def binomial_series(
+    exponent: Fraction, reach: Fraction, tolerance: Fraction
+) -> tuple[tuple[Fraction, ...], Fraction]:
+    """Return a truncated series of (1 + u)^exponent in u, and a bound of its error.
+
+    The exponent is from -1 to 1, and `reach` bounds the magnitude of u, below 1.
+
+    >>> binomial_series(Fraction(-1, 2), Fraction(1, 8), Fraction(1, 100))
+    ((Fraction(1, 1), Fraction(-1, 2)), Fraction(3, 448))
+    """
+    # Coefficients do not grow in magnitude: what is left out is less than a geometric series.
+    coefficients = [Fraction(1)]
+    while True:
+        degree = len(coefficients)
+        following = coefficients[-1] * (exponent - degree + 1) / degree
+        left_out = abs(following) * reach**degree / (1 - reach)
+        if left_out <= tolerance:
+            return tuple(coefficients), left_out
+        coefficients.append(following)
+
+
 @cache
 def arctangent_series(tolerance: Fraction) -> tuple[tuple[Fraction, ...], Fraction]:
     """Return a polynomial in u^2 that is arctan(u)/u, and a bound of the error of their product with u.

@@ -21,6 +21,7 @@ from strapgen.ir.notebook_display import counted_shape, short_repr
 from strapgen.ir.read_only import read_only
 from strapgen.ir.renamed import renamed, renamed_parameters
 from strapgen.ir.sources import Sources
+from strapgen.registry import Merged
 from strapgen.run.backend_names import (
     BACKENDS,
     DEFAULT_BACKENDS,
@@ -50,6 +51,7 @@ __all__ = [
 ]
 
 
+_KERNELS = Merged(catalogue.KERNELS, catalogue.LAYOUT_KERNELS)
 #: Orthonormalizations that leave the attitude where it is, but for rounding: one factor for all parameters, and for
 #: matrices a symmetric expansion of the inverse root of C'C.
 KEEP_THE_ATTITUDE = frozenset(
@@ -604,7 +606,7 @@ def evaluator(kernel: AnyAlgorithm, backend: str = "numpy", settings: Settings |
     checks.require("evaluator", name, str, Choice)
     checks.choice("backend", backend, BACKENDS)
     if isinstance(name, str):
-        checks.choice("kernel", name, {**catalogue.KERNELS, **catalogue.LAYOUT_KERNELS})
+        checks.choice("kernel", name, _KERNELS)
     choice = catalogue.choose(name)
     return of_sources(
         sources_of_choice(choice, BACKENDS[backend].target, _settings_of_kernel(backend, settings))
