@@ -436,7 +436,7 @@ class Settings(ReadOnly):
             "allowance": str(self.allowance),
             "ranges": {name: str(value) for name, value in self.ranges.items()},
             "formats": dict(self.formats),
-            "stated": self.stated,
+            "stated": "" if self.stated == f"--max-angle-rad {self.largest_angle}" else self.stated,
             "sensor": self.sensor and self.sensor.as_dict(),
             "input_bits": self.input_bits,
             "state": self.state,
@@ -448,7 +448,9 @@ class Settings(ReadOnly):
     @property
     def identity(self) -> str:
         """Text that differs between different settings."""
-        return json.dumps(self.as_dict() | {"increments": self.increments}, sort_keys=True)
+        return json.dumps(
+            self.as_dict() | {"stated": self.stated, "increments": self.increments}, sort_keys=True
+        )
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> Settings:
