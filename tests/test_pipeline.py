@@ -25,6 +25,7 @@ EXAMPLE = Path(__file__).resolve().parents[1] / "examples" / "modified_rodrigues
 #: The functions that take the choice on its way from the command line to the text of C, in order: the name of the
 #: algorithm until it is chosen, then the choice, or a request that holds it.
 WALK = """
+cli.option_groups _process
 cli.option_groups grouped.<locals>.run
 cli.option_groups Option.value
 cli.generate_command generate

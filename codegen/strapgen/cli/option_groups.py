@@ -49,10 +49,13 @@ def read_words(command: Any, context: Any) -> None:
 
     Typer converts each by a library whose import takes longer than the rest of a short command.
     """
-    words = str if isinstance(getattr(command.callback, "options", None), CommandOptions) else bool
+    known = getattr(command.callback, "options", None)
+    of_words = {VARIANT.name} if isinstance(known, CommandOptions) else set()
+    if isinstance(known, CommandOptions):
+        of_words |= {name for name, one in known.options.items() if one.read or one.kind in (str, Path)}
     for parameter in command.get_params(context):
-        kind = bool if getattr(parameter, "is_flag", False) else words
-        vars(parameter)["process_value"] = partial(_process, parameter, kind)
+        is_word = parameter.name in of_words and not getattr(parameter, "is_flag", False)
+        vars(parameter)["process_value"] = partial(_process, parameter, str if is_word else bool)
 
 
 def _process(parameter: Any, kind: type, context: Any, value: Any) -> Any:

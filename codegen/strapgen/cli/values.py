@@ -113,7 +113,8 @@ def whole(smallest: int, largest: int | None = None) -> Reader:
 
 def path(option: str, word: str | Path) -> Path:
     """Return the path of a word; what is there can be read."""
-    if os.access(word, os.F_OK) and not os.access(word, os.R_OK):
+    is_path = "\0" not in str(word)  # what opens it refuses it otherwise
+    if is_path and os.access(word, os.F_OK) and not os.access(word, os.R_OK):
         raise InputError(f"{option} {word} cannot be read; its permissions are in the way")
     return Path(word)
 

@@ -47,7 +47,7 @@ def with_exact_parts_apart(quantities: Quantities, words: Container[str]) -> Qua
     items = dict(quantities.items)
     results = {name for names in quantities.results.values() for name in names if isinstance(name, str)}
     for name, quantity in quantities.items.items():
-        definition = items[name].definition
+        definition, rest_name = items[name].definition, f"{name}_rest"
         if name in words or name in results or quantity.range_checked or not isinstance(definition, Sum):
             continue
         apart: Terms = {
@@ -59,13 +59,16 @@ def with_exact_parts_apart(quantities: Quantities, words: Container[str]) -> Qua
         users = [one for one in items.values() if name in used_by(one)]
         if not apart or not any(m for m, _ in rest) or not all(_adds(one, name) for one in users):
             continue
+        meaning = quantity.meaning and f"{quantity.meaning}, without what is linear"
         inside = Ranges(items, {}).enclosure(rest)
-        items[name] = replace(items[name], definition=Sum(rest), range=inside)
+        other = replace(quantity, name=rest_name, definition=Sum(rest), range=inside, meaning=meaning)
         for user in users:
             assert isinstance(user.definition, Sum)
             terms = dict(user.definition.terms)
-            more = combined(terms, apart, terms[name,])
+            factor = terms.pop((name,))
+            more = combined({**terms, (rest_name,): factor}, apart, factor)
             items[user.name] = replace(user, definition=Sum(tuple(more.items())))
+        items = {one.name: one for one in (other if one.name == name else one for one in items.values())}
     return Quantities(items, dict(quantities.results))
 
 

@@ -98,7 +98,7 @@ def lowered(program: Program, settings: Settings, high: bool = True) -> FixedPro
 def _high_words(
     program: Program, settings: Settings, quantities: Quantities, plan: FormatPlan, other: Quantization
 ) -> Quantization | None:
-    """Return a walk that narrows sums to their high words, where that costs no more than a hundredth in error."""
+    """Return a walk that narrows sums to their high words, where that costs no more than a sixtieth in error."""
     if other.resets:
         return None
     results = {
@@ -117,7 +117,7 @@ def _high_words(
         return _walk(program, settings, some, plan, most, high, known)
 
     try:
-        narrowed = high_words(walk, with_exact_parts_apart(quantities, plan.words), limits)
+        narrowed = high_words(walk, with_exact_parts_apart(quantities, {*plan.words, *plan.forced}), limits)
     except (InputError, ArithmeticError):  # a word is too short, or a coarse divisor may be zero
         return None
     if narrowed is not None:

@@ -136,8 +136,13 @@ def fill_expression(text: str, indent: str, width: int = 99) -> str:
 
 
 def fill_arguments(text: str, indent: str, width: int = 99) -> str:
-    """Wrap a declaration or a call after its commas, every line after the first with `indent`."""
-    return _filled(re.split(r"(?<=,) ", text), indent, width)
+    """Wrap a declaration or a call after its commas, every line after the first with `indent`.
+
+    Where the first argument does not fit, a line ends with the parenthesis before it.
+    """
+    first, *others = re.split(r"(?<=,) ", text)
+    pieces = [first] if len(first) <= width else re.split(r"(?<=\()", first, maxsplit=1)
+    return _filled([*pieces, *others], indent, width)
 
 
 def fill_lines(text: str, width: int = 99) -> str:
