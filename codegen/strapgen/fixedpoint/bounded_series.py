@@ -227,7 +227,7 @@ def _ranges(program: Program, box: Mapping[str, Interval], arguments: set[Node])
     from strapgen.fixedpoint.floating.exact_ranges import ExactRanges  # loads numpy, as only proofs do
 
     try:
-        exact = ExactRanges(part, expressions, box)
+        exact = ExactRanges(part, expressions, box, sharp={*places.values()})
     except (NoBoundError, ArithmeticError):
         return {}
     if exact.conditions:  # a range that holds under conditions is not one of the declared box

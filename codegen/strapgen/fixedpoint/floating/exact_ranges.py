@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Container, Mapping
 from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import Any
@@ -56,6 +56,8 @@ _ON_SAMPLES: dict[str, Callable[..., Any]] = {
     "at_least": np.greater_equal,
     "select": np.where,
 }
+#: A magnitude on samples above every range.
+_NO_BIT_TO_GAIN = 2.0**1000
 _SUMS = ("add", "subtract", "multiply", "negate")
 
 #: Of a quantity whose range alone is known.
@@ -69,6 +71,7 @@ class ExactRanges:
     program: Program
     expressions: Expressions
     box: Mapping[str, Interval]  # range of every element of an input
+    sharp: Container[int] | None = None  # places whose ranges lose no bit; None for all
     ranges: list[Interval] = field(default_factory=list)
     conditions: list[Condition] = field(default_factory=list)
 
@@ -106,6 +109,8 @@ class ExactRanges:
         if expression.kind in _SUMS:
             terms = self._terms(expression)
             seen = float(np.nan_to_num(np.abs(self._anywhere[place]), posinf=0).max()) or 1e-300
+            if self.sharp is not None and place not in self.sharp:
+                seen = _NO_BIT_TO_GAIN
             known = self._proofs.of_sum(name, terms, seen)
             if remainder := self.expressions.remainders.get(place):
                 known = known.widened(remainder)
