@@ -148,7 +148,7 @@ def faults(text: str) -> dict[str, str]:
     """Return C with one fault each: a sign, a constant, a shift, a limit, a state written before it is checked."""
     limit = str(table_of("euler", "c-fixed", SETTINGS, 1).sources.fixed.inputs[1].high)
     result = {
-        "sign": text.replace("d1_y, sigma_z)", "d1_y, -sigma_z)", 1),
+        "sign": text.replace("nml(sigma_z, d1_y)", "mul(sigma_z, d1_y)", 1),
         "limit": text.replace(f"INT32_C({limit})", f"INT32_C({int(limit) + 1})"),
         "code": text.replace("return 1;", "return 2;"),
         "output": text.replace("        return 1;", "        next[0] = 0;\n        return 1;"),

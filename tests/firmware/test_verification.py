@@ -100,8 +100,8 @@ def test_a_file_with_constants_holds_and_one_with_others_does_not(target, tmp_pa
 @pytest.mark.parametrize(
     ("ending", "old", "new", "reason", "computes"),
     [
-        ("c", r"1431655765", r"1431655763", "edited", True),
-        ("c", r"(\+ \(INT64_C\(1\) << \d+\)), 38\)", r"\1, 37)", "edited", False),
+        ("c", r"178956971", r"178956970", "edited", True),
+        ("c", r"(\+ \(INT16_C\(1\) << 4\)), 5\)", r"\1, 4)", "edited", False),
         ("h", r"--carry none", r"--carry full", "other options", None),
         (
             "h",
