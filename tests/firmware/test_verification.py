@@ -125,6 +125,13 @@ def test_a_change_is_found_with_its_line(ending, old, new, reason, computes, fol
     assert bool(data["wrong_calls"]) is not computes
 
 
+def test_series_of_a_declared_range_are_verified(tmp_path, capsys):
+    words = f"generate euler --method magnus4 --target c --max-rate-deg-s 400 --step 0.01 --out {tmp_path}"
+    assert says(words, capsys)[0] == 0
+    status, said, _ = says(f"verify {tmp_path}/euler_magnus4_2.c", capsys)
+    assert status == 0 and "return what they must" in said
+
+
 @pytest.mark.long
 @pytest.mark.parametrize("target", ["c", "c-float"])
 def test_floating_point_is_held_to_its_bound(target, tmp_path, capsys):

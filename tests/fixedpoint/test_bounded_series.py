@@ -224,15 +224,13 @@ def test_settings_of_fixed_point_and_ranges_that_do_not_fit_are_refused():
         strapgen.generate(step, "c", Settings(ranges={"rates": Fraction(1)}))
 
 
-def test_the_command_line_declares_a_range_and_verifies_it(tmp_path, capsys):
+def test_the_command_line_declares_a_range(tmp_path, capsys):
     words = f"generate euler --method magnus4 --target c --max-rate-deg-s 400 --step 0.01 --out {tmp_path}"
     assert says(words, capsys)[0] == 0
     header = (tmp_path / "euler_magnus4_2.h").read_text()
     assert "Series in place of functions: cos(x) for x up to 0.0" in header
     assert "--max-rate-deg-s 400 --step 0.01 --target c" in " ".join(header.replace("\n *", "").split())
     assert "at most 0.0349065 in magnitude" in " ".join(header.replace("\n *", "").split())
-    status, said, _ = says(f"verify {tmp_path}/euler_magnus4_2.c", capsys)
-    assert status == 0 and "return what they must" in said
     status, _, refused = says(f"{words} --word 32", capsys)
     assert status == 2 and refused.startswith("strapgen: the options of fixed point go with --target c-fixed")
 
