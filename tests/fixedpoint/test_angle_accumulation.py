@@ -74,7 +74,7 @@ def assert_holds(errors: np.ndarray, bounds: np.ndarray, carry: str) -> None:
     ("algorithm", "carry", "steps", "every"),
     [
         ("euler", "none", 600, 0),
-        ("euler", "full", 600, 0),
+        ("euler", "full", 1200, 0),  # long enough that what the first residuals add once is small
         ("dcm", "none", 600, 0),
         *(
             pytest.param(
@@ -94,7 +94,7 @@ def test_no_adversary_gets_above_the_bound_nor_far_below(adversarial_run, algori
     assert_holds(result.errors, result.bounds, carry)
     # Every part of the run adds as much as any other: what holds now holds after a million steps.
     half = result.errors[len(result.errors) // 2 - 1]
-    assert result.errors[-1] == pytest.approx(2 * half, rel=0.2)
+    assert result.errors[-1] == pytest.approx(2 * half, rel=0.1)
     # A bound that claims as much less a step is passed.
     angles = adversary.interface.angle_accumulation
     weak = replace(angles, per_step=angles.per_step / LARGEST_RATIO[carry])
