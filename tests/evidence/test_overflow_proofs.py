@@ -23,8 +23,8 @@ needs_eva = pytest.mark.skipif(not provers.EVA.installed(), reason=f"install {pr
 #: Texts of the C, with what a fault makes of them.
 FAULTS = {
     "shift": ("+ 2, 2);", "+ 2, 1);"),
-    "shift, though nothing overflows": ("(INT64_C(1) << 31), 32);", "(INT64_C(1) << 31), 31);"),
-    "widening": (f"{NAME}_mul(e_x, half_turn_0_x)", "(e_x * half_turn_0_x)"),
+    "shift, though nothing overflows": (">> 32)", ">> 31)"),
+    "widening": (f"{NAME}_mul(e_s, half_turn_0_x)", "(e_s * half_turn_0_x)"),
     "sign": ("3)\n        - (int64_t)d2_x", "3)\n        + (int64_t)d2_x * 2"),
     "factor": (f"{NAME}_mul(d1_x, 3)", f"{NAME}_mul(d1_x, 30)"),
     "removed check": (f"\n        || {NAME}_out(d2_z, (INT32_C(1) << 30))", ""),
