@@ -205,7 +205,7 @@ def test_strict_compilers_are_silent(word, methods, tmp_path):
     (tmp_path / "all.inc").write_text("".join(f'#include "{name}"\n' for name in files))
     commands = [
         ["cc", *STRICT, "-fsyntax-only", *files],  # each by itself
-        ["c++", "-x", "c++", "-std=c++17", "-Wall", "-Wextra", "-Werror", "-fsyntax-only", "all.inc"],
+        ["c++", "-x", "c++", "-std=c++14", "-Wall", "-Wextra", "-Werror", "-fsyntax-only", "all.inc"],
     ]
     if word == 64:  # shorter words are compiled with optimization where their semantics are looked at
         commands.append(["cc", *STRICT, "-O2", "-c", "-o", "all.o", "-x", "c", "all.inc"])
