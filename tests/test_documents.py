@@ -489,6 +489,40 @@ def test_the_page_on_the_command_line_shows_every_command():
     assert shown == {name for name, command in commands if not command.hidden}
 
 
+#: Options of `generate` from which the folder and the names of files follow, with their defaults.
+NAMING = {
+    "--method": "rk4",
+    "--window": "",
+    "--increments": "2",
+    "--previous": "",
+    "--target": "",
+    "--word": "32",
+    "--algorithm": "euler",
+    "--name": "",
+    "--prefix": "",
+    "--out": "-",
+}
+
+
+def written_by(command: str) -> tuple[str, ...]:
+    """Return what the files that a command generates are named after; nothing for a command that writes none."""
+    words = shlex.split(command)
+    if "generate" not in words[1:3] or "--out" not in words:
+        return ()
+    kernel = words[: words.index("generate") + 2]
+    stated = NAMING | {one: value for one, value in pairwise(words) if one in NAMING}
+    return (*kernel, *stated.values())
+
+
+@pytest.mark.parametrize("page", ["README", *DOCS])
+def test_commands_of_a_page_do_not_write_over_each_others_files(page):
+    """A reader who runs them in their order would be refused: files with other options need --force."""
+    before: dict[tuple[str, ...], str] = {}
+    for command in shown_commands({"README": README, **DOCS}[page]):
+        if files := written_by(command):
+            assert before.setdefault(files, command) == command
+
+
 def test_commands_write_only_ignored_files_into_the_checkout():
     pages = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *PAGES]
     pages += [*(ROOT / "examples").glob("*.py"), *(ROOT / "codegen" / "strapgen" / "cli").rglob("*.py")]
