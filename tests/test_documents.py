@@ -623,6 +623,49 @@ def test_back_ends_side_by_side_are_those_of_the_command(capsys):
             assert numbers[:5] == others[:5]
 
 
+@pytest.mark.parametrize(("option", "in_counts"), [("--step 0.01", False), ("--lsb 0.0175dps", True)])
+def test_the_page_on_fixed_point_quotes_the_headers_of_its_commands(option, in_counts, workplace, capsys):
+    page = DOCS["fixed-point"]
+    command = next(c for c in shown_commands(page) if c.startswith("strapgen generate euler") and option in c)
+    run(re.sub(r"--out \S+", "--out out", command), capsys)
+    header = Path("out/euler_rk4_2_w32.h").read_text()
+    quoted = [block for block in blocks(page, "(?:c|text)") if block.startswith(("/* One call", " * "))]
+    mine = [block for block in quoted if ("counts of the gyro" in block) == in_counts]
+    assert mine and [missing(block, header) for block in mine] == [[]] * len(mine)
+
+
+def figures(page: str, row: str) -> list[str]:
+    """Return the cells of the row of a page's table that begins with some words, without that first one."""
+    (found,) = re.findall(rf"^\| {re.escape(row)} \|(.*)\|$", DOCS[page], re.MULTILINE)
+    return [cell.strip() for cell in found.split("|")]
+
+
+def measured() -> Iterator[tuple[str, str]]:
+    """Yield options of `strapgen cost` and the instructions that pages state of them on a Cortex-M3."""
+    (names,) = re.findall(r"^\| \| (window-7-7 \| pair-.*) \|$", DOCS["windows"], re.MULTILINE)
+    for carry in ("none", "full"):
+        stated = figures("windows", f"instructions, `--carry {carry}`")
+        for name, figure in zip(names.split(" | "), stated, strict=True):
+            yield f"euler --method {name} --carry {carry}", figure
+    gyro = "--max-rate-deg-s 400 --sample-hz 100"
+    for algorithm, row in (("euler", "Euler parameters"), ("dcm", "direction cosines")):
+        (found,) = re.findall(rf"^\| {row} \| (\d+) \| (\d+) \| \d+ % \|$", DOCS["fixed-point"], re.MULTILINE)
+        yield from zip([f"{algorithm} {gyro}", f"{algorithm} {gyro} --lsb 0.0175dps"], found, strict=True)
+    (found,) = re.findall(r"takes (\d+) instructions in rad and (\d+) in counts", DOCS["fixed-point"])
+    options = [f"euler {gyro} --state q31", f"euler {gyro} --lsb 0.0175dps --state q31"]
+    yield from zip(options, found, strict=True)
+
+
+@pytest.mark.long
+@pytest.mark.needs("arm-none-eabi-gcc", "qemu-system-arm")
+@pytest.mark.parametrize(("options", "figure"), [*measured()])
+def test_instructions_on_pages_are_those_of_the_command(options, figure, capsys):
+    (row,) = json.loads(run(f"strapgen cost {options} --cpu cortex-m3 --format json", capsys))
+    if "12.2.1" not in row["compiler"]:
+        pytest.skip(f"the pages have figures of arm-none-eabi-gcc 12.2.1, and this is {row['compiler']}")
+    assert f"{row['executed']:,}" == figure
+
+
 # The page on the lecture of 1984
 
 
