@@ -18,7 +18,7 @@ from strapgen.fixedpoint import bounded_series
 from strapgen.fixedpoint.bounded_series import SHARE, with_declared_ranges
 from strapgen.fixedpoint.floating import rounding_bounds
 from strapgen.fixedpoint.floating.errors import NUMBERS
-from strapgen.fixedpoint.quantization import lowered
+from strapgen.fixedpoint.quantization import finished, planned
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.program import OPERATIONS, Constant, Node, Operation, Program
@@ -299,7 +299,7 @@ def test_fixed_point_normalizes_by_a_series_where_that_costs_no_error(rng):
     made = strapgen.quantize(step, settings)
     assert not made.operations.get("sqrt") and not made.operations.get("divide")
     assert made.program == step  # the contract is that of the closed form
-    assert made.error_bounds["next"] < lowered(step, settings).error_bounds["next"]
+    assert made.error_bounds["next"] < finished(planned(step, settings)).error_bounds["next"]
     model = strapgen.build(strapgen.generate(made, "fixed-model"))
     increments = model.representable(rng.choice([-0.01, 0.01], (8, 3, 3)) * 0.999)
     state = np.array([0.5, -0.5, 0.5, 0.5])
