@@ -21,7 +21,7 @@ from strapgen.fixedpoint.floating.errors import NUMBERS
 from strapgen.fixedpoint.quantization import lowered
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.fixed_settings import Settings
-from strapgen.ir.program import OPERATIONS, Constant, Node, Operation, Program
+from strapgen.ir.program import OPERATIONS, Assignment, Constant, Node, Operation, Program, Reference
 from strapgen.run.backends import BACKENDS
 
 #: Largest increments in rad: that of a slow rate, of 400 deg/s in two samples of 5 ms, the default, and a large one.
@@ -199,6 +199,17 @@ def test_series_need_a_declared_range_of_all_inputs_and_a_small_argument():
     made = with_declared_ranges(cosine_of_length(), Settings(ranges=both))
     (closed,), (series,) = (exactly(one, values)["out"] for one in (cosine_of_length(), made))
     assert 0 < abs(closed - series) <= made.body[-1].remainder
+
+
+def test_a_range_that_holds_of_proper_states_alone_allows_no_series():
+    """The length of a state is near 1 of proper ones, and may be zero in the box that is declared."""
+    normalize = pipeline.program(catalogue.choose("euler-normalize"))
+    square = node("multiply", "inverse_norm", "inverse_norm")
+    cosine = Assignment("c", node("cos", node("multiply", Fraction(1, 8), node("sqrt", square))))
+    output = replace(normalize.outputs[0], nodes=(Reference("c"),) * 4)
+    code = replace(normalize, body=(*normalize.body, cosine), outputs=(output,))
+    made = with_declared_ranges(code, Settings(ranges={"state": Fraction(17, 16)}))
+    assert made.operations["function"] == 1 and not any(a.remainder for a in made.body)
 
 
 def test_functions_inside_other_operations_have_values_of_their_own():
