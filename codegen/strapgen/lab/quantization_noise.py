@@ -25,6 +25,7 @@ from strapgen.catalogue import Choice
 from strapgen.catalogue.methods import rate_fit
 from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError
+from strapgen.kernel.algebra import CROSS
 from strapgen.kernel.power_series import Powers, constant, outputs
 from strapgen.lab.one_step import Step, step
 
@@ -167,19 +168,22 @@ def _weights(
     """Return the weights of the increments in a rotation vector, and those of their cross products."""
     symbols = [symbol for vector in increments for symbol in vector]
     x, *_ = polynomials = [sp.Poly(sp.expand(element), *symbols) for element in rotation]
-    vectors = [sp.Matrix(list(vector)) for vector in increments]
-    linear = [x.coeff_monomial(vector[0]) for vector in vectors]
+
+    def powers_of(*elements: tuple[int, int]) -> tuple[int, ...]:
+        """Return the powers of a product of elements, each a vector and its axis."""
+        places = [3 * vector + axis for vector, axis in elements]
+        return tuple([int(place in places) for place in range(len(symbols))])
+
+    linear = [x.coeff_monomial(powers_of((i, 0))) for i in range(len(increments))]
     products = {
-        (i, j): x.coeff_monomial(vectors[i][1] * vectors[j][2])
-        for i, j in combinations(range(len(vectors)), 2)
+        (i, j): x.coeff_monomial(powers_of((i, 1), (j, 2)))
+        for i, j in combinations(range(len(increments)), 2)
     }
-    again = sp.zeros(3, 1)
-    for weight, vector in zip(linear, vectors, strict=True):
-        again += weight * vector
-    for (i, j), weight in products.items():
-        again += weight * vectors[i].cross(vectors[j])
-    for polynomial, element in zip(polynomials, again, strict=True):
-        rest = polynomial - sp.Poly(element, *symbols)
+    for axis, ((a, b), polynomial) in enumerate(zip(CROSS, polynomials, strict=True)):
+        again = {powers_of((i, axis)): weight for i, weight in enumerate(linear)}
+        for (i, j), weight in products.items():
+            again |= {powers_of((i, a), (j, b)): weight, powers_of((i, b), (j, a)): -weight}
+        rest = polynomial - sp.Poly.from_dict(again, *symbols)
         if any(sum(powers) < 3 and coefficient != 0 for powers, coefficient in rest.terms()):
             raise InputError(
                 "the rotation vector is no sum of increments and their cross products to the second power: "
