@@ -118,7 +118,18 @@ def test_integers_have_the_bits_of_mpmath(kernel, digits, rng):
             values = dict(zip(elements, (x for each in inputs for x in each), strict=True))
             wanted = program.run(values, exact.number, exact._OPERATIONS)
             assert interpreter._on_integers(values) == wanted
-            assert interpreter.outputs(*inputs) == wanted
+            for _ in range(exact._FIRST_RUNS):
+                assert interpreter.outputs(*inputs) == wanted
+
+
+def test_a_program_is_compiled_when_it_runs_often():
+    interpreter = exact.Interpreter(strapgen.pipeline.program(choose("euler-normalize")))
+    state = [mpmath.mpf(x) for x in (1, 2, 4, 2)]
+    for _ in range(exact._FIRST_RUNS):
+        first = interpreter(state)
+    assert "_on_integers" not in vars(interpreter)
+    assert interpreter(state) == first
+    assert "_on_integers" in vars(interpreter)
 
 
 def test_halves_are_rounded_to_the_even_number():

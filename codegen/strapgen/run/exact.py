@@ -92,6 +92,8 @@ _ON_INTEGERS = {
     "at_least": "m = (am << ae - be if ae >= be else am) >= (bm if ae >= be else bm << be - ae)",
     "select": "m, e = (bm, be) if am else (cm, ce)",
 }
+#: Runs of a program before it is compiled for integers, which takes as long as thirty or forty of them.
+_FIRST_RUNS = 10
 #: The names in these lines that stand for those of a slot.
 _NAME = re.compile(r"\b([abc]?[me])\b")
 #: To the nearest, of two as near to the even one.
@@ -155,6 +157,7 @@ class Interpreter:
     def __init__(self, program: Program) -> None:
         self.program = program
         self._constants: dict[Fraction, Any] = {}
+        self._runs = 0
 
     def __reduce__(self) -> tuple[type[Interpreter], tuple[Program]]:
         return type(self), (self.program,)
@@ -168,7 +171,8 @@ class Interpreter:
         values: dict[str, Any] = {}
         for signal, elements in zip(self.program.inputs, inputs, strict=True):
             values |= zip(signal.elements, elements, strict=True)
-        if all([type(value) is mpmath.mpf for value in values.values()]):
+        self._runs += 1
+        if self._runs > _FIRST_RUNS and all([type(value) is mpmath.mpf for value in values.values()]):
             with suppress(_NoNumberError):
                 return self._on_integers(values)
         return self.program.run(values, self._constant, _OPERATIONS)
