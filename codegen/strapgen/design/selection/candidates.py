@@ -18,7 +18,6 @@ from strapgen.analysis.vibration import assessment
 from strapgen.analysis.vibration.rectification import Rectification, rectified
 from strapgen.catalogue import METHODS, Choice
 from strapgen.catalogue.methods.shaped_coning import ShapedConing
-from strapgen.catalogue.methods.window import GyroResponse
 from strapgen.design import coning_design
 from strapgen.design.brief import DesignBrief, SpectralEnvironment, read_brief
 from strapgen.design.coning_design import ConingBrief, of_spectrum
@@ -273,11 +272,8 @@ def design_coefficients(path: str, objective: str, samples: int, previous: int) 
     """Return the coefficients that are designed for the spectrum of a brief and for its gyro."""
     brief = read_brief(Path(path))
     assert isinstance(brief.environment, SpectralEnvironment), "only these are tuned for"
-    gyro = None
-    if brief.gyro.bandwidth_hz is not None and brief.gyro.damping is not None:
-        gyro = GyroResponse(brief.gyro.bandwidth_hz, brief.gyro.damping, brief.gyro.sample_hz)
     lines = of_spectrum(brief.environment.spectrum, brief.gyro.sample_hz)
-    return coning_design.design(ConingBrief(samples, previous, objective, lines=lines, gyro=gyro))
+    return coning_design.design(ConingBrief(samples, previous, objective, lines=lines, gyro=brief.gyro.seen))
 
 
 def algorithm_of(candidate: Candidate, state: str, brief: DesignBrief, path: str | Path) -> Algorithm:
