@@ -280,6 +280,13 @@ class GyroBrief:
         """The response once the brief is read; None for a gyro whose samples are integrals of the rate."""
         return self.response if isinstance(self.response, Response) and self.response.changes else None
 
+    def noise_ratio(self, rate_deg_s: Fraction) -> Fraction:
+        """Return the standard deviation of an increment's noise and pulses by that of a rate."""
+        # A random walk of N deg in a root of an hour is N / 60 in a root of a second.
+        walk = self.noise_deg_sqrt_h / 60 / math.sqrt(self.sample_hz)
+        size = math.hypot(walk, float(self.pulse_arcsec) / 3600 / math.sqrt(12))
+        return Fraction(f"{size * self.sample_hz / rate_deg_s:.3e}")
+
     def gain(self, frequency_hz: Any) -> Any:
         """Return the complex factor by which it passes on an oscillation at a frequency, or at many, in Hz."""
         return (self.seen or Response()).gain(frequency_hz)

@@ -185,24 +185,13 @@ def design(
     >>> [one.name for one in window.one_sided]
     ['window-1-2-2-to-1-rad-3-1', 'window-1-2-2-to-1-rad-4-0', 'window-1-2-2-to-1-rad-0-4', 'window-1-2-2-to-1-rad-1-3']
     """
-    designed = {size: _filters(brief, size, brief.one_sided_noise) for size in track(brief.sizes)}
-    committed = Window(
-        slug(brief.full_title),
-        brief.full_title,
-        _source(brief),
-        brief.increments,
-        brief.previous,
-        brief.ahead,
-        brief.conditions,
-        brief.band,
-        brief.objective,
-        designed[brief.previous, brief.ahead],
-        brief.gyro,
-        brief.noise,
-        brief.rotation,
-        brief.terms,
-        form="legendre" if brief.taps is None else "pair",
-    )
+    committed, designed = None, {}
+    for size in track(brief.sizes):
+        if committed is None:
+            committed = commit_filters(brief)
+        else:
+            designed[size] = _filters(brief, size, brief.one_sided_noise)
+    assert committed is not None, "its size is the first one"
     windows = {}
     for size in one_sided_sizes(brief.previous, brief.ahead):
         if size in designed:
@@ -214,6 +203,31 @@ def design(
         for size in start_sizes(brief.previous, brief.ahead)
     )
     return replace(committed, one_sided=tuple(windows.values()), start=start)
+
+
+def commit_filters(brief: FamilyBrief) -> Window:
+    """Return the filters that commit an attitude alone, as `design` does.
+
+    >>> commit_filters(FamilyBrief(2, 2, Fraction(1), degree=2)).one_sided
+    ()
+    """
+    return Window(
+        slug(brief.full_title),
+        brief.full_title,
+        _source(brief),
+        brief.increments,
+        brief.previous,
+        brief.ahead,
+        brief.conditions,
+        brief.band,
+        brief.objective,
+        _filters(brief, (brief.previous, brief.ahead), brief.one_sided_noise),
+        brief.gyro,
+        brief.noise,
+        brief.rotation,
+        brief.terms,
+        form="legendre" if brief.taps is None else "pair",
+    )
 
 
 def _source(brief: FamilyBrief) -> str:
