@@ -247,7 +247,7 @@ def test_repr_has_few_lines():
         "  angle increments\n"
         "  state (4), increments (2 x 3) -> next (4); order 4>"
     )
-    assert repr(program()).endswith("\n  30 add, 38 multiply; 14 temporaries>")
+    assert repr(program()).endswith("\n  31 add, 37 multiply; 15 temporaries>")
     assert repr(strapgen.choose("euler", "rk4", 2)) == "Choice(name='euler', method='rk4', increments=2)"
     assert repr(strapgen.Settings()) == "Settings()"
     assert repr(strapgen.Settings(word=16)) == "Settings(word=16)"

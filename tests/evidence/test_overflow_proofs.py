@@ -89,6 +89,7 @@ def test_eva_proves_a_step(monkeypatch, tmp_path):
         *(pytest.param(RK1, Settings(carry=carry), id=f"{carry} carried") for carry in CARRIES),
         *(pytest.param(RK1, Settings(word=word), id=f"{word} bits") for word in (16, 64)),
         pytest.param(RK1, Settings(rounding="truncation", state="q31"), id="saturated"),
+        pytest.param(RK1, Settings(multiply="high"), id="high words"),
         pytest.param(
             Choice("euler-from-dcm"), Settings(rounding="truncation"), marks=pytest.mark.long, id="quotients"
         ),

@@ -26,6 +26,8 @@ EXECUTED = {
     ("euler", "rv32imc"): 275,
     ("dcm", "cortex-m3"): 350,
 }
+#: Instructions of a call at most where the high words of products are taken alone.
+HIGH_PRODUCTS = {("euler", "rv32imc"): 155, ("dcm", "rv32imc"): 320, ("euler", "cortex-m3"): 150}
 #: Instructions of a call on a Cortex-M3 that takes the counts of a gyro: a tenth more than 226, which the step on
 #: angles took once, and for direction cosines 15 % more than 520.
 COUNTS = {"euler": 248, "dcm": 598}
@@ -58,6 +60,15 @@ def test_a_call_executes_few_instructions(kernel, cpu):
     assert 0 < measured.multiplications < measured.instructions
     assert measured.code_bytes >= 2 * measured.instructions
     assert measured.stack_bytes > 0
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(("kernel", "cpu"), HIGH_PRODUCTS)
+def test_high_words_of_products_alone_execute_few_instructions(kernel, cpu):
+    needed(cpu)
+    settings = Settings.of(max_rate_deg_s=400, step="0.01", increments=2, multiply="high")
+    sources = pipeline.generate(pipeline.lower(pipeline.derive(kernel)), "c-fixed", settings)
+    assert 50 < cost.cost(sources, cpu).executed <= HIGH_PRODUCTS[kernel, cpu]
 
 
 @pytest.mark.long

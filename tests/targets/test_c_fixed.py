@@ -68,7 +68,14 @@ MANY = 250_000
 
 @pytest.mark.long
 @pytest.mark.parametrize(
-    "settings", [Settings(16), Settings(32), Settings(32, rounding="truncation", carry="full")]
+    "settings",
+    [
+        Settings(16),
+        Settings(32),
+        Settings(32, rounding="truncation", carry="full"),
+        Settings(32, multiply="high"),
+        Settings(64, multiply="high"),
+    ],
 )
 @pytest.mark.parametrize("choice", [EULER, Choice("dcm", "rk4", 2)], ids=lambda choice: choice.kernel)
 def test_a_quarter_of_a_million_random_inputs(choice, settings, rng):

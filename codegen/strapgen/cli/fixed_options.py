@@ -136,8 +136,8 @@ class FixedOptions:
         option(
             "--multiply",
             metavar="NAME",
-            help="How products with a constant are computed: product, or shift-add for sums of shifted terms.  "
-            "[default: product]",
+            help="How products are computed: product; shift-add for sums of shifted terms in place of those with a "
+            "constant; high for the high words of all products alone.  [default: product]",
             read=names("strapgen.ir.formats:MULTIPLICATIONS"),
         ),
     ] = None

@@ -114,11 +114,14 @@ def check_rounding(rounding: str) -> str:
     return checks.choice("rounding", rounding, ROUNDINGS)
 
 
-#: How products with a constant are computed, and what that is in words.
+#: How products are computed, and what that is in words.
 MULTIPLICATIONS = {
     "product": "by the processor's multiplication",
     "shift-add": "as sums of shifted terms, by the canonical signed digits of the constant",
+    "high": "by the high words of all products alone, which are added up in words",
 }
+#: Words whose products have a high word of their own.
+WORDS_WITH_HIGH_PRODUCTS = (32, 64)
 
 
 def signed_digits(value: int, most: int = 0) -> tuple[tuple[int, int], ...]:
