@@ -307,6 +307,11 @@ def _vector(value: Vector) -> Array:
 ERRORS = UserFile("a file of sensor errors", ErrorFile, 1 << 16)
 
 
+def path_of(source: str | Path) -> Path:
+    """Return the file of sensor errors, or of a class."""
+    return _FOLDER / f"{source}.toml" if str(source) in CLASSES else checks.path("errors", source)
+
+
 def read(source: str | Path) -> InstrumentErrors:
     """Read the errors of sensors.
 
@@ -330,5 +335,5 @@ def read(source: str | Path) -> InstrumentErrors:
     >>> errors.drawn, (errors.gyro.bias / np.radians(1 / 3600)).round(6).tolist()
     (True, [0.01, 0.01, 0.01])
     """
-    path = _FOLDER / f"{source}.toml" if str(source) in CLASSES else checks.path("errors", source)
+    path = path_of(source)
     return ERRORS.convert(path, lambda file: file.errors(Path(path).parent))
