@@ -410,6 +410,14 @@ def test_a_pair_is_shown_with_its_product(run):
             "--form pair --u-taps 4 --v-taps 0 --band 1",
             "v-taps is 0; a whole number at least 1 is needed",
         ),
+        (
+            "--form pair --u-taps 1 --v-taps 1 --band 1",
+            "u-taps is 1; a whole number at least 2 is needed",
+        ),
+        (
+            "--form pair --u-taps 3 --v-taps 3 --powers 13 --band 1",
+            "--powers is 13; a whole number from 1 to 12 is needed",
+        ),
         ("--form two --band 1", "form 'two' is not known; allowed: legendre, pair"),
     ],
 )

@@ -97,10 +97,10 @@ class FamilyBrief:
 
     def __post_init__(self) -> None:
         """Refuse more conditions than samples, and a rotation that is not good enough for steps of several samples."""
-        checks.count("conditions", self.conditions, largest=self.previous + self.increments + self.ahead)
         if self.taps is not None:
             self._check_pair(self.taps)
-        elif self.increments > 1 and self.rotation != "exact":
+        checks.count("conditions", self.conditions, largest=self.previous + self.increments + self.ahead)
+        if self.taps is None and self.increments > 1 and self.rotation != "exact":
             raise InputError(
                 f"rotation is {self.rotation!r}; steps of {self.increments} samples take the exact one"
             )

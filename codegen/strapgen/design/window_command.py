@@ -245,11 +245,13 @@ def _brief(size: WindowSize, band: Band, name: str | None) -> FamilyBrief:
             f"at most {windows.MOST_SAMPLES} are allowed"
         )
     radians, gyro = band.radians(), band.gyro()
+    # Of a pair it is the taps that are too few for the powers, which its brief says.
+    most = windows.MOST_CONDITIONS if pair else min(samples, windows.MOST_CONDITIONS)
     return FamilyBrief(
         previous,
         ahead,
         radians,
-        checks.count("--powers", size.powers, largest=min(samples, windows.MOST_CONDITIONS)),
+        checks.count("--powers", size.powers, largest=most),
         checks.count("--coefficients", size.coefficients, largest=windows.MOST_DEGREE),
         gyro,
         Fraction(band.noise),

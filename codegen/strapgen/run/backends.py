@@ -451,10 +451,12 @@ class Backend:
         if told and not np.isfinite(history[:, -1]).all():
             checks.require_finite("samples", samples, d)
         states = self._states(history).reshape(shape)
-        if out is None or np.may_share_memory(states, out):
+        if out is None:
             return states
-        out[...] = states
-        return np.asarray(out)
+        if not np.may_share_memory(states, out):
+            out[...] = states
+        result: Array = out
+        return result
 
     def propagate_parts(
         self,
