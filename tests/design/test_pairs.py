@@ -276,9 +276,8 @@ def test_an_exact_rotation_takes_large_cones():
     assert drifts[1] < drifts[0] / 10
 
 
-def test_velocity_needs_four_filters():
-    with pytest.raises(InputError, match="pair-1-8 is a pair, which gives the attitude alone"):
-        choose("velocity-position", "pair-1-8")
+def test_a_pair_gives_velocity_as_its_one_sided_filters_do():
+    assert choose("velocity-position", "pair-1-8").window == WINDOWS["pair-1-8"]
     assert choose("velocity-position", "pair-1-8-9-7").window == WINDOWS["pair-1-8-9-7"]
 
 

@@ -13,7 +13,7 @@ from strapgen.fixedpoint import quantization
 from strapgen.fixedpoint.high_words import in_order
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.fixed_settings import Settings
-from strapgen.ir.integer_program import FixedProgram, IntegerSum, Value, used_by
+from strapgen.ir.integer_program import FixedProgram, IntegerSum, Value, high_word_of_halves, used_by
 
 RATES = {"max_rate_deg_s": 400, "step": "0.01"}
 
@@ -80,7 +80,7 @@ def test_what_is_rounded_down_counts_a_whole_unit():
         assert value.error >= Fraction(1, 1 << value.fraction)
 
 
-@pytest.mark.parametrize("multiply", ["product", "high"])
+@pytest.mark.parametrize("multiply", ["product", "high", "half"])
 @pytest.mark.parametrize("algorithm", ["euler", "dcm"])
 def test_errors_of_calls_lie_inside_the_certified_bound(algorithm, multiply, rng):
     settings = Settings.of(increments=2, multiply=multiply, **RATES)
@@ -148,10 +148,31 @@ def test_values_are_refined_until_the_error_is_at_most_twice_the_finest():
     assert errors[1] < 5 * errors[0]
 
 
-@pytest.mark.parametrize("word", [8, 16, 24])
-def test_short_words_have_no_high_products(word):
-    with pytest.raises(InputError, match=f"multiply high goes with words of 32 or 64 bits; word is {word}"):
-        Settings(word=word, multiply="high")
+def test_a_high_word_from_half_words_is_below_the_product_by_less_than_three_units():
+    """The worst pair: what each of the three products loses is largest at once."""
+    words = [high * 65536 + low for high in (-32768, -3, 0, 1, 3, 32767) for low in (0, 1, 65533, 65535)]
+    lost = [Fraction(a * b, 1 << 32) - high_word_of_halves(a, b, 32) for a in words for b in words]
+    assert min(lost) >= 0 and Fraction(29, 10) < max(lost) < 3
+
+
+def test_half_words_lose_three_units_a_product():
+    values = {value.name: value for value in quantized("euler", multiply="half").body}
+    part, total = values["sigma_dot_sigma_part"], values["sigma_dot_sigma"]
+    assert part.definition.halves and part.error * 2**part.fraction == 3
+    (constant,) = [term.factor for term in total.definition.fine if not term.names]
+    assert constant == 5 and total.error * 2**total.fraction == 5
+    assert Fraction(93, 100) < in_units(quantized("euler", multiply="half")) < Fraction(17, 10)
+
+
+@pytest.mark.parametrize(
+    ("multiply", "word", "allowed"),
+    [("high", 8, "32 or 64"), ("high", 16, "32 or 64"), ("half", 16, "32"), ("half", 64, "32")],
+)
+def test_other_words_have_no_high_products(multiply, word, allowed):
+    with pytest.raises(
+        InputError, match=f"multiply {multiply} goes with words of {allowed} bits; word is {word}"
+    ):
+        Settings(word=word, multiply=multiply)
 
 
 def test_a_result_that_high_products_do_not_hold_names_the_option():

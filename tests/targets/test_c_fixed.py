@@ -75,6 +75,7 @@ MANY = 250_000
         Settings(32, rounding="truncation", carry="full"),
         Settings(32, multiply="high"),
         Settings(64, multiply="high"),
+        Settings(32, multiply="half"),
     ],
 )
 @pytest.mark.parametrize("choice", [EULER, Choice("dcm", "rk4", 2)], ids=lambda choice: choice.kernel)

@@ -41,6 +41,7 @@ SETTINGS = [
     Settings(word=64, multiply="shift-add"),
     Settings(word=64, carry="full"),
     Settings(word=32, multiply="high"),
+    Settings(word=32, multiply="half"),
 ]
 #: Kernels with roots, quotients, selections, products of wide numbers, several outputs and scalars.
 SOME = [("euler",), ("dcm-orthonormalize-optimal",), ("euler-from-dcm",), ("euler-normalize",)]

@@ -137,7 +137,8 @@ class FixedOptions:
             "--multiply",
             metavar="NAME",
             help="How products are computed: product; shift-add for sums of shifted terms in place of those with a "
-            "constant; high for the high words of all products alone.  [default: product]",
+            "constant; high for the high words of all products alone; half for those from half words.  "
+            "[default: product]",
             read=names("strapgen.ir.formats:MULTIPLICATIONS"),
         ),
     ] = None

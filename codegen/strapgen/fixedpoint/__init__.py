@@ -19,6 +19,11 @@ def quantize(program: Program, settings: Settings) -> FixedProgram:
     from strapgen.fixedpoint.quantization import lowered
     from strapgen.fixedpoint.sensor_scale import counted, in_counts
 
+    if any(signal.constraint == "covariance" for signal in program.inputs):
+        raise InputError(
+            f"{program.kernel} holds a covariance, which is computed in floating point alone; velocity-position and an "
+            "attitude step of the same method have the rest in fixed point"
+        )
     if settings.input_bits is not None and not counted(program):
         what = "an lsb" if settings.sensor is not None else "a number of input bits"
         raise InputError(f"{program.kernel} takes no increments; {what} does not go with it")

@@ -31,7 +31,7 @@ from strapgen.fixedpoint.quantities import (
 )
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.fixed_settings import Settings
-from strapgen.ir.formats import ROUNDINGS, Format, finest, from_digits, signed_digits
+from strapgen.ir.formats import LOST, ROUNDINGS, Format, finest, from_digits, signed_digits
 from strapgen.ir.integer_program import Coefficient, IntegerOperation, IntegerSum, Term, Value
 from strapgen.ir.interfaces import ErrorFeedback
 from strapgen.ir.program import Program
@@ -352,7 +352,7 @@ def _narrowed(
         beyond = top - word - fraction
         narrowed = len(terms.products) + len(terms.multiples) + sum(i.place > fraction for i in terms.shifted)
         if not products or (high.alone and beyond > 0 and narrowed * (1 - Fraction(1, 1 << beyond)) <= 1):
-            top = min(top, fraction + word)  # then nothing is left to round, and the error is no larger
+            top = min(top, fraction + word)  # then nothing is left to round
         _note_wanted(context, products, top)
         products += [_multiple(context, monomial, c, top) for monomial, c, _ in terms.multiples]
     down = name in high.down
@@ -393,25 +393,26 @@ def _of_words(
 ) -> Value:
     """Return a sum whose products are narrowed to their high words one by one and added up in words at a place.
 
-    What is cut off is between 0 and a unit: its mean is in the constant of the sum.
+    The mean of what is cut off is in the constant of the sum.
     """
     word = context.word
-    if len(products) == 1 and not terms.shifted and not terms.constant:
+    halves = context.settings.multiply == "half"
+    if len(products) == 1 and not terms.shifted and not terms.constant and not halves:
         shift = products[0].place - fraction
         return _round(context, quantity, products, fraction, followed, down=shift == word)
     placed: list[Placed] = []
     constant, left = terms.constant, Fraction(0)
-    for item in (*products, *terms.shifted):
-        is_wide = any(context.values[name].wide for name in item.term.names)
-        is_multiplied = len(item.term.names) == 2 or abs(item.term.factor) != 1
-        if not is_multiplied and not is_wide and item.place <= place:
-            placed.append(item)
-            continue
-        bits = min(item.place - word if is_multiplied else item.place, place)
-        part = _part(context, high, quantity, item, bits)
-        half = Fraction(2) ** (-bits - 1)
-        placed.append(replace(part, error=part.error - half))
-        constant += half * part.term.factor
+    for unnarrowed in (*products, *terms.shifted):
+        item, mean = unnarrowed, Fraction(0)
+        if _is_multiplied(item.term):
+            bits = item.place - word if halves else min(item.place - word, place)
+            item = _part(context, high, quantity, item, bits)
+            mean = Fraction(LOST[context.settings.multiply], 2) * Fraction(2) ** -bits
+        if item.place > place or any(context.values[name].wide for name in item.term.names):
+            item = _part(context, high, quantity, item, min(item.place, place))
+            mean += Fraction(1, 2) * Fraction(2) ** -item.place
+        placed.append(replace(item, error=item.error - mean))
+        constant += mean * item.term.factor
     if constant:
         integer = nearest(constant * Fraction(2) ** place)
         left = abs(integer / Fraction(2) ** place - constant)
@@ -421,6 +422,11 @@ def _of_words(
         else:
             placed[0] = replace(placed[0], error=placed[0].error + up(left))
     return _round(context, quantity, placed, fraction, followed, place)
+
+
+def _is_multiplied(term: Term) -> bool:
+    """Return whether a term is a product, or a value times a number that is no shift."""
+    return len(term.names) == 2 or abs(term.factor) != 1
 
 
 def _note_wanted(context: Quantization, products: Sequence[Placed], top: int) -> None:
@@ -466,7 +472,8 @@ def _part(context: Quantization, high: HighWords, quantity: Quantity, item: Plac
     term = replace(item.term, factor=sign * item.term.factor)
     part = Quantity(name, quantity.definition, Fraction(0), _range_of(context, term, item.place))
     down = high.alone or name in high.down
-    value = _round(context, part, [replace(item, term=term)], fraction, down=down)
+    halves = context.settings.multiply == "half" and _is_multiplied(term)
+    value = _round(context, part, [replace(item, term=term)], fraction, down=down, halves=halves)
     context.add(value)
     return Placed(Term((name,), sign), fraction, value.error)
 
@@ -631,10 +638,12 @@ def _round(
     followed: Fraction = Fraction(0),
     top: int | None = None,
     down: bool = False,
+    halves: bool = False,
 ) -> Value:
     """Return a sum as a word of so many fraction bits.
 
-    `top` is the place at which what is rounded is added up, by default the finest; `down` rounds it down.
+    `top` is the place at which what is rounded is added up, by default the finest; `down` rounds it down; `halves` is
+    for one product, whose high word comes from half words.
     """
     word, values = context.word, context.values
     fine_terms = [item for item in terms if item.place > fraction]
@@ -656,6 +665,8 @@ def _round(
     # With error feedback, the result is off by what was left before and what is left now.
     roundings = 2 if feedback is not None else 1
     rounding_error = Fraction(1) if down else context.rounding_error
+    if halves:
+        rounding_error = Fraction(LOST["half"])
     error = fine.error + coarse.error + roundings * rounding_error / Fraction(2) ** fraction
     value = integer_value(
         context,
@@ -668,6 +679,7 @@ def _round(
             drop,
             in_words=coarse.peak + rounded_peak <= largest_word,
             down=down,
+            halves=halves,
         ),
         fraction,
         error,

@@ -48,7 +48,7 @@ from strapgen.fixedpoint.quantities import (
 from strapgen.fixedpoint.quantities import used_by as used_by_quantity
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.fixed_settings import Settings
-from strapgen.ir.formats import Format, finest
+from strapgen.ir.formats import LOST, Format, finest
 from strapgen.ir.integer_program import (
     FixedProgram,
     IntegerOperation,
@@ -77,7 +77,7 @@ def lowered(program: Program, settings: Settings, high: bool = True) -> FixedPro
     """
     quantities, plan = _plan(program, settings)
     finest = _walk(program, settings, quantities, plan, {})
-    if settings.multiply == "high":
+    if settings.multiply in LOST:
         context = _high_products(program, settings, quantities, plan, finest)
         return _with_accumulation(context, _fixed_program(context))
     coarser = aligning(finest.body, finest.values, plan.forced)
@@ -136,9 +136,11 @@ def _high_words(
 def _high_products(
     program: Program, settings: Settings, quantities: Quantities, plan: FormatPlan, finest: Quantization
 ) -> Quantization:
-    """Return the walk that narrows every product to its high word, with an error of twice the finest if it can be."""
+    """Return the walk that narrows every product to its high word, with an error of few times the finest."""
     outputs, transition = _result_names(program, quantities)
-    limits = {name: 2 * finest.values[name].error for name in outputs if name in finest.values}
+    # A product loses that much in place of half a unit.
+    times = 1 + LOST[settings.multiply]
+    limits = {name: times * finest.values[name].error for name in outputs if name in finest.values}
     parted = with_exact_parts_apart(quantities, {*plan.words, *plan.forced})
     # A sum of products is one of words, except where a root or a comparison takes it.
     compared = {
@@ -157,7 +159,7 @@ def _high_products(
     try:
         context = high_products(_walks(program, settings, plan), parted, limits)
     except InputError as error:
-        raise InputError(f"{error} with multiply high") from None
+        raise InputError(f"{error} with multiply {settings.multiply}") from None
     context.body = in_order(context.body, outputs, transition)
     return context
 

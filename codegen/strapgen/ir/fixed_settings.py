@@ -15,7 +15,7 @@ from strapgen.ir.exceptions import InputError, InputTypeError
 from strapgen.ir.formats import (
     MULTIPLICATIONS,
     SHORTEST_WORD,
-    WORDS_WITH_HIGH_PRODUCTS,
+    WORDS_OF_HIGH_PRODUCTS,
     Format,
     check_rounding,
     check_word,
@@ -129,8 +129,8 @@ class Settings(ReadOnly):
     state : str
         "q31", "q15" or "q63" for a state whose elements lie in -1 to 1 less a unit and saturate; "" for room above 1.
     multiply : str
-        How products are computed: "product", "shift-add" for those with a constant, or "high" for the high words of all
-        alone, with words of 32 or 64 bits.
+        How products are computed: "product", "shift-add" for those with a constant, "high" for the high words of all
+        alone, with words of 32 or 64 bits, or "half" for high words from half words, with words of 32 bits.
     digits : int
         Canonical signed digits of a constant that "shift-add" takes; 0 for all that a word has.
     increments : int or None
@@ -179,8 +179,12 @@ class Settings(ReadOnly):
         object.__setattr__(self, "digits", digits)
         if self.digits and self.multiply != "shift-add":
             raise InputError(f"digits is {self.digits}; it goes with multiply shift-add")
-        if self.multiply == "high" and self.word not in WORDS_WITH_HIGH_PRODUCTS:
-            raise InputError(f"multiply high goes with words of 32 or 64 bits; word is {self.word}")
+        words = WORDS_OF_HIGH_PRODUCTS.get(self.multiply, (self.word,))
+        if self.word not in words:
+            allowed = " or ".join(map(str, words))
+            raise InputError(
+                f"multiply {self.multiply} goes with words of {allowed} bits; word is {self.word}"
+            )
         most = LARGEST_ANGLE * (1 if self.whole_step is None else _MOST_INCREMENTS)
         if not SMALLEST_ANGLE <= self.largest_angle <= most:
             # In the names of Python; the command line turns them into options again.
