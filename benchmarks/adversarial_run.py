@@ -112,7 +112,7 @@ class Adversary:
             settings.word - 1
         )  # whatever the rounding: a constant cancels from step to step
         self.units = np.array([2.0**-word.fraction for word in feedbacks])
-        self.normalization = self.backend.beside(NORMALIZATIONS[algorithm])
+        self.normalization = self.backend.companion(NORMALIZATIONS[algorithm])
         self.exact_normalization = strapgen.evaluator(NORMALIZATIONS[algorithm])
 
     def numbers(self, integers: np.ndarray) -> np.ndarray:

@@ -26,7 +26,7 @@ from generators import GENERATORS, Case
 
 HERE = Path(__file__).resolve().parent
 FLAGS = ["-O3", "-ffp-contract=off"]
-COMPILERS = {"c": ["gcc", "-std=c99"], "c++": ["g++", "-std=c++17"]}
+COMPILERS = {"c": ["gcc", "-std=c99"], "c++": ["g++", "-std=c++14"]}
 SIZES = {"euler": 4, "dcm": 9, "increments": 6, "rates": 9}
 TITLES = {
     "euler-increments": "Euler parameters, two angle increments",
@@ -109,7 +109,7 @@ def generate(contender: Contender) -> None:
         ]
     )
     counter = contender.folder / "count"
-    run(["g++", "-std=c++17", *common, str(HERE / "count.cpp"), "-o", str(counter)])
+    run(["g++", "-std=c++14", *common, str(HERE / "count.cpp"), "-o", str(counter)])
     contender.counts = tuple(map(int, run([str(counter)]).stdout.split()))
     contender.instructions = instructions(library)
     prepare(contender, library, state, samples)

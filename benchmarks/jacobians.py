@@ -192,7 +192,7 @@ def count(generator: str, step, limit: float) -> str:
         state, samples, outputs = json.loads(done.stdout.splitlines()[-1])
         sizes = [f"-DSTATE={state}", f"-DSAMPLES={samples}", f"-DOUTPUTS={outputs}"]
         program = Path(name) / "count"
-        build = ["g++", "-std=c++17", "-w", "-fpermissive", f"-I{name}", *sizes, str(HERE / "count.cpp")]
+        build = ["g++", "-std=c++14", "-w", "-fpermissive", f"-I{name}", *sizes, str(HERE / "count.cpp")]
         built = subprocess.run([*build, "-o", str(program)], capture_output=True, text=True)
         if built.returncode:
             return next((line for line in built.stderr.splitlines() if "error" in line), "does not compile")

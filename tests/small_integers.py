@@ -19,7 +19,15 @@ from strapgen.fixedpoint.integer_sums import Quantization
 from strapgen.fixedpoint.intervals import Interval
 from strapgen.fixedpoint.quantities import InputElement, Quantities, Quantity
 from strapgen.ir.fixed_settings import Settings
-from strapgen.ir.integer_program import IntegerOperation, IntegerSum, Scaled, Term, Value, cases_of
+from strapgen.ir.integer_program import (
+    IntegerOperation,
+    IntegerSum,
+    Scaled,
+    Term,
+    Value,
+    cases_of,
+    high_word_of_halves,
+)
 
 #: Bounds are rounded up to numbers of so many bits below the point, a few times each.
 GRID = Fraction(1, 1 << 150)
@@ -111,6 +119,10 @@ def _sum(total: IntegerSum, integers: Mapping[str, int], nearest: bool) -> tuple
     fine, coarse = ([_term(term, integers) for term in terms] for terms in (total.fine, total.coarse))
     if not total.shift:
         return sum(fine + coarse), _partial(fine + coarse)
+    if total.halves:
+        (term,) = total.fine
+        factors = [*(integers[name] for name in term.names), *[term.factor] * (len(term.names) == 1)]
+        return high_word_of_halves(*factors, total.shift), _partial(fine)
     if total.residual is None:
         fine.append(1 << (total.shift - 1) if nearest else 0)
         inside = sum(fine)

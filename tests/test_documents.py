@@ -229,7 +229,12 @@ def test_the_drifts_in_the_readme_are_those_of_its_command(capsys, monkeypatch):
 
 
 #: Pictures of the pages that a command on a page draws, by what its file of that command is called.
-DRAWN = {"cone-drift": "README", "orders": "paths/paper", "bounds": "paths/firmware"}
+DRAWN = {
+    "cone-drift": "README",
+    "orders": "paths/paper",
+    "bounds": "paths/firmware",
+    "word-length": "fixed-point",
+}
 
 
 @pytest.mark.long
@@ -489,6 +494,40 @@ def test_the_page_on_the_command_line_shows_every_command():
     assert shown == {name for name, command in commands if not command.hidden}
 
 
+#: Options of `generate` from which the folder and the names of files follow, with their defaults.
+NAMING = {
+    "--method": "rk4",
+    "--window": "",
+    "--increments": "2",
+    "--previous": "",
+    "--target": "",
+    "--word": "32",
+    "--algorithm": "euler",
+    "--name": "",
+    "--prefix": "",
+    "--out": "-",
+}
+
+
+def written_by(command: str) -> tuple[str, ...]:
+    """Return what the files that a command generates are named after; nothing for a command that writes none."""
+    words = shlex.split(command)
+    if "generate" not in words[1:3] or "--out" not in words:
+        return ()
+    kernel = words[: words.index("generate") + 2]
+    stated = NAMING | {one: value for one, value in pairwise(words) if one in NAMING}
+    return (*kernel, *stated.values())
+
+
+@pytest.mark.parametrize("page", ["README", *DOCS])
+def test_commands_of_a_page_do_not_write_over_each_others_files(page):
+    """A reader who runs them in their order would be refused: files with other options need --force."""
+    before: dict[tuple[str, ...], str] = {}
+    for command in shown_commands({"README": README, **DOCS}[page]):
+        if files := written_by(command):
+            assert before.setdefault(files, command) == command
+
+
 def test_commands_write_only_ignored_files_into_the_checkout():
     pages = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *PAGES]
     pages += [*(ROOT / "examples").glob("*.py"), *(ROOT / "codegen" / "strapgen" / "cli").rglob("*.py")]
@@ -587,6 +626,49 @@ def test_back_ends_side_by_side_are_those_of_the_command(capsys):
         # Integers are the same everywhere; time and bytes are those of a machine, doubles those of its library.
         if name.startswith("c-fixed"):
             assert numbers[:5] == others[:5]
+
+
+@pytest.mark.parametrize(("option", "in_counts"), [("--step 0.01", False), ("--lsb 0.0175dps", True)])
+def test_the_page_on_fixed_point_quotes_the_headers_of_its_commands(option, in_counts, workplace, capsys):
+    page = DOCS["fixed-point"]
+    command = next(c for c in shown_commands(page) if c.startswith("strapgen generate euler") and option in c)
+    run(re.sub(r"--out \S+", "--out out", command), capsys)
+    header = Path("out/euler_rk4_2_w32.h").read_text()
+    quoted = [block for block in blocks(page, "(?:c|text)") if block.startswith(("/* One call", " * "))]
+    mine = [block for block in quoted if ("counts of the gyro" in block) == in_counts]
+    assert mine and [missing(block, header) for block in mine] == [[]] * len(mine)
+
+
+def figures(page: str, row: str) -> list[str]:
+    """Return the cells of the row of a page's table that begins with some words, without that first one."""
+    (found,) = re.findall(rf"^\| {re.escape(row)} \|(.*)\|$", DOCS[page], re.MULTILINE)
+    return [cell.strip() for cell in found.split("|")]
+
+
+def measured() -> Iterator[tuple[str, str]]:
+    """Yield options of `strapgen cost` and the instructions that pages state of them on a Cortex-M3."""
+    (names,) = re.findall(r"^\| \| (window-7-7 \| pair-.*) \|$", DOCS["windows"], re.MULTILINE)
+    for carry in ("none", "full"):
+        stated = figures("windows", f"instructions, `--carry {carry}`")
+        for name, figure in zip(names.split(" | "), stated, strict=True):
+            yield f"euler --method {name} --carry {carry}", figure
+    gyro = "--max-rate-deg-s 400 --sample-hz 100"
+    for algorithm, row in (("euler", "Euler parameters"), ("dcm", "direction cosines")):
+        (found,) = re.findall(rf"^\| {row} \| (\d+) \| (\d+) \| \d+ % \|$", DOCS["fixed-point"], re.MULTILINE)
+        yield from zip([f"{algorithm} {gyro}", f"{algorithm} {gyro} --lsb 0.0175dps"], found, strict=True)
+    (found,) = re.findall(r"takes (\d+) instructions in rad and (\d+) in counts", DOCS["fixed-point"])
+    options = [f"euler {gyro} --state q31", f"euler {gyro} --lsb 0.0175dps --state q31"]
+    yield from zip(options, found, strict=True)
+
+
+@pytest.mark.long
+@pytest.mark.needs("arm-none-eabi-gcc", "qemu-system-arm")
+@pytest.mark.parametrize(("options", "figure"), [*measured()])
+def test_instructions_on_pages_are_those_of_the_command(options, figure, capsys):
+    (row,) = json.loads(run(f"strapgen cost {options} --cpu cortex-m3 --format json", capsys))
+    if "12.2.1" not in row["compiler"]:
+        pytest.skip(f"the pages have figures of arm-none-eabi-gcc 12.2.1, and this is {row['compiler']}")
+    assert f"{row['executed']:,}" == figure
 
 
 # The page on the lecture of 1984

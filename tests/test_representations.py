@@ -119,6 +119,14 @@ OBJECTS: dict[str, Callable[[], Any]] = {
     "GridSamples": lambda: strapgen.GridSamples(np.zeros((4, 3)), 0.005, (200.0, 200.0)),
     "StampError": lambda: strapgen.StampError(strapgen.StampStatus.GAP, "a sample is lost"),
     "StampStatus": lambda: next(iter(strapgen.StampStatus)),
+    "Preintegrator": lambda: strapgen.Preintegrator("pair-1-5", sample_hz=200),
+    "Preintegrated": lambda: strapgen.Preintegrated(
+        np.eye(3), *np.zeros((2, 3)), np.zeros((9, 9)), np.ones((9, 6)), np.array(0.5), *np.zeros((2, 3))
+    ),
+    "PreintegrationError": lambda: strapgen.PreintegrationError(
+        strapgen.PreintegrationStatus.GAP, "a sample is lost"
+    ),
+    "PreintegrationStatus": lambda: next(iter(strapgen.PreintegrationStatus)),
     "Target": lambda: strapgen.TARGETS["c"],
     "Language": lambda: strapgen.Language(str.isidentifier, lambda texts: [{*" ".join(texts).split()}]),
 }
@@ -247,7 +255,7 @@ def test_repr_has_few_lines():
         "  angle increments\n"
         "  state (4), increments (2 x 3) -> next (4); order 4>"
     )
-    assert repr(program()).endswith("\n  30 add, 38 multiply; 14 temporaries>")
+    assert repr(program()).endswith("\n  31 add, 37 multiply; 15 temporaries>")
     assert repr(strapgen.choose("euler", "rk4", 2)) == "Choice(name='euler', method='rk4', increments=2)"
     assert repr(strapgen.Settings()) == "Settings()"
     assert repr(strapgen.Settings(word=16)) == "Settings(word=16)"

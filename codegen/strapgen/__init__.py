@@ -16,7 +16,7 @@ Functions take the object, a name or a Choice alike:
   recordings  read, Recording, StampedGrid, propagate; rests, TrueAttitude, time_offset, attitude_error
   judgement   compare, converge, certify, check, rounding_bounds; unknowns, vibration, study
   your own    KernelBuilder, Signal, Stage, algebra, tableaux, windows, window_design; Target, Language
-  navigation  read_system, system_runner, course, TwoSpeed, CommitLate, recording_attitudes
+  navigation  read_system, system_runner, course, TwoSpeed, CommitLate, recording_attitudes, Preintegrator
   notebooks   formulas; to_rotation and from_rotation; plot, to_pandas and to_xarray of what runs return
 
 SI units and rad, unless a name says otherwise; matrices lead from body to reference axes. Wrong input raises a
@@ -115,6 +115,10 @@ if _typing.TYPE_CHECKING:
     from strapgen.lab.scipy_rotations import to_rotation as to_rotation
     from strapgen.navigation.courses import Course as Course
     from strapgen.navigation.courses import course as course
+    from strapgen.navigation.preintegration.preintegrator import Preintegrated as Preintegrated
+    from strapgen.navigation.preintegration.preintegrator import PreintegrationError as PreintegrationError
+    from strapgen.navigation.preintegration.preintegrator import PreintegrationStatus as PreintegrationStatus
+    from strapgen.navigation.preintegration.preintegrator import Preintegrator as Preintegrator
     from strapgen.navigation.systems.system_runner import SystemRunner as SystemRunner
     from strapgen.navigation.systems.system_runner import system_runner as system_runner
     from strapgen.navigation.systems.wiring import read_system as read_system
@@ -169,6 +173,12 @@ _NAMES = {
     "stamped.stamped_grid": (
         "GridSamples",
         "StampedGrid",
+    ),
+    "navigation.preintegration.preintegrator": (
+        "Preintegrated",
+        "PreintegrationError",
+        "PreintegrationStatus",
+        "Preintegrator",
     ),
     "navigation.systems.system_runner": (
         "SystemRunner",

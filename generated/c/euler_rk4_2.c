@@ -34,18 +34,19 @@ void euler_rk4_2(const double state[4], const double increments[6], double next[
     const double sigma_cross_d1_y = sigma_z * d1_x - sigma_x * d1_z;
     const double sigma_cross_d1_z = sigma_x * d1_y - sigma_y * d1_x;
     const double sigma_dot_sigma = sigma_x * sigma_x + sigma_y * sigma_y + sigma_z * sigma_z;
+    const double sigma_dot_sigma_over_48 = 0.020833333333333332 * sigma_dot_sigma;
     /* weight of sigma in p */
-    const double p_sigma = 0.5 - 0.020833333333333332 * sigma_dot_sigma;
+    const double p_sigma = 0.5 - sigma_dot_sigma_over_48;
     /* weight of sigma_cross_d1 in p */
-    const double p_sigma_cross_d1 = 0.16666666666666666 - p_sigma;
+    const double p_sigma_cross_d1 = sigma_dot_sigma_over_48 - 0.3333333333333333;
     /* the step applied to the identity: its vector part */
     const double p_x = p_sigma * sigma_x + p_sigma_cross_d1 * sigma_cross_d1_x;
     const double p_y = p_sigma * sigma_y + p_sigma_cross_d1 * sigma_cross_d1_y;
     const double p_z = p_sigma * sigma_z + p_sigma_cross_d1 * sigma_cross_d1_z;
     const double d1_dot_d2 = d1_x * d2_x + d1_y * d2_y + d1_z * d2_z;
     /* its scalar part */
-    const double p_s = sigma_dot_sigma * (0.041666666666666664 * d1_dot_d2
-        - 0.0078125 * sigma_dot_sigma - 0.125) + 1.0;
+    const double p_s = sigma_dot_sigma_over_48 * (d1_dot_d2 + d1_dot_d2 - 0.375 * sigma_dot_sigma
+        - 6.0) + 1.0;
     /* Euler parameters, body to reference, scalar last, after the step */
     const double next_s = e_s * p_s - e_x * p_x - e_y * p_y - e_z * p_z;
     const double next_x = e_s * p_x + e_x * p_s + e_y * p_z - e_z * p_y;

@@ -34,18 +34,19 @@ void euler_rk4_2_float(const float state[4], const float increments[6], float ne
     const float sigma_cross_d1_y = sigma_z * d1_x - sigma_x * d1_z;
     const float sigma_cross_d1_z = sigma_x * d1_y - sigma_y * d1_x;
     const float sigma_dot_sigma = sigma_x * sigma_x + sigma_y * sigma_y + sigma_z * sigma_z;
+    const float sigma_dot_sigma_over_48 = 0.020833334f * sigma_dot_sigma;
     /* weight of sigma in p */
-    const float p_sigma = 0.5f - 0.020833334f * sigma_dot_sigma;
+    const float p_sigma = 0.5f - sigma_dot_sigma_over_48;
     /* weight of sigma_cross_d1 in p */
-    const float p_sigma_cross_d1 = 0.16666667f - p_sigma;
+    const float p_sigma_cross_d1 = sigma_dot_sigma_over_48 - 0.33333334f;
     /* the step applied to the identity: its vector part */
     const float p_x = p_sigma * sigma_x + p_sigma_cross_d1 * sigma_cross_d1_x;
     const float p_y = p_sigma * sigma_y + p_sigma_cross_d1 * sigma_cross_d1_y;
     const float p_z = p_sigma * sigma_z + p_sigma_cross_d1 * sigma_cross_d1_z;
     const float d1_dot_d2 = d1_x * d2_x + d1_y * d2_y + d1_z * d2_z;
     /* its scalar part */
-    const float p_s = sigma_dot_sigma * (0.041666668f * d1_dot_d2 - 0.0078125f * sigma_dot_sigma
-        - 0.125f) + 1.0f;
+    const float p_s = sigma_dot_sigma_over_48 * (d1_dot_d2 + d1_dot_d2 - 0.375f * sigma_dot_sigma
+        - 6.0f) + 1.0f;
     /* Euler parameters, body to reference, scalar last, after the step */
     const float next_s = e_s * p_s - e_x * p_x - e_y * p_y - e_z * p_z;
     const float next_x = e_s * p_x + e_x * p_s + e_y * p_z - e_z * p_y;

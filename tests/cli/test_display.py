@@ -88,7 +88,7 @@ def test_lines_break_before_signs_where_the_page_ends():
 
 def test_programs_show_code_and_counts():
     text = ALGORITHM.program()._repr_html_()
-    assert "<pre>" in text and "30 add, 38 multiply; 14 temporaries</summary>" in text
+    assert "<pre>" in text and "31 add, 37 multiply; 15 temporaries</summary>" in text
     assert "sigma_dot_sigma" in text
     fixed = strapgen.quantize(ALGORITHM.program())._repr_html_()
     assert "Q1.30" in fixed and "<td" in fixed

@@ -57,6 +57,7 @@ def test_balls_that_are_too_wide_prove_nothing(monkeypatch):
         (("dcm", "rk4"), {}),
         (("euler", "rk2"), {}),
         (("euler", "rk4"), {"carry": "full"}),
+        (("euler", "rk4"), {"multiply": "high"}),
     ],
     ids=str,
 )

@@ -60,7 +60,11 @@ def test_error_bounds_in_fixed_point_are_proved_and_close(choice, tmp_path):
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("settings", [{"word": 16}, {"carry": "full"}, {"rounding": "truncation"}], ids=str)
+@pytest.mark.parametrize(
+    "settings",
+    [{"word": 16}, {"carry": "full"}, {"rounding": "truncation"}, {"multiply": "high"}, {"multiply": "half"}],
+    ids=str,
+)
 def test_other_words_error_feedback_and_truncation_are_followed(settings, tmp_path):
     assert judged(fixed_script(fixed(EULER, **settings)), tmp_path)[0] == "proved"
 

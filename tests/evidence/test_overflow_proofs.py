@@ -89,6 +89,8 @@ def test_eva_proves_a_step(monkeypatch, tmp_path):
         *(pytest.param(RK1, Settings(carry=carry), id=f"{carry} carried") for carry in CARRIES),
         *(pytest.param(RK1, Settings(word=word), id=f"{word} bits") for word in (16, 64)),
         pytest.param(RK1, Settings(rounding="truncation", state="q31"), id="saturated"),
+        pytest.param(RK1, Settings(multiply="high"), id="high words"),
+        pytest.param(RK1, Settings(multiply="half"), id="half words"),
         pytest.param(
             Choice("euler-from-dcm"), Settings(rounding="truncation"), marks=pytest.mark.long, id="quotients"
         ),
@@ -98,6 +100,24 @@ def test_z3_proves_every_word_rounding_and_feedback(choice, settings, model):
     """Words, rounding, error feedback and quotients are followed; roots too, as `strapgen evidence --all` shows."""
     subject = Subject(choice, settings)
     assert provers.judged_by_z3(subject, subject.sources.step_files, MODELS[model]) == ("proved", "")
+
+
+@needs_z3
+@pytest.mark.parametrize(
+    "fault",
+    [
+        pytest.param(("_asr(a_high * b_low, 16)", "_asr(a_high * b_low, 15)"), id="places"),
+        pytest.param(("(a_high * b_high) + ", ""), id="upper halves"),
+        pytest.param(("(uint32_t)b & 0xFFFFu", "(uint32_t)b & 0x7FFFu"), id="lower half"),
+        pytest.param(("a_low * b_high", "a_low * b_low"), id="factor"),
+    ],
+)
+def test_half_words_with_a_fault_are_not_proved(fault):
+    subject = Subject(RK1, Settings(multiply="half"))
+    files, source = subject.sources.step_files, f"{subject.name}.c"
+    assert fault[0] in files[source]
+    files = {**files, source: files[source].replace(*fault)}
+    assert provers.judged_by_z3(subject, files, MODELS[MODEL])[0] == "fails"
 
 
 pytest.importorskip("z3")

@@ -63,6 +63,8 @@ def test_a_processor_returns_the_integers_of_the_model(monkeypatch, tmp_path):
         ("dcm", Settings(word=16, carry="state", rounding="truncation")),
         ("euler", Settings.of(sample_hz=100, lsb="0.0175dps")),
         ("euler", Settings(state="q31")),
+        ("euler", Settings(multiply="high")),
+        ("euler", Settings(multiply="half")),
     ],
 )
 def test_every_kind_of_argument_is_run(kernel, settings, monkeypatch, tmp_path):

@@ -42,6 +42,48 @@ def test_a_quotient_by_a_number_is_a_multiple():
     assert (y.range.lowest, y.range.highest) == (Fraction(-3, 4), Fraction(3, 4))
 
 
+def third_of(name: str) -> Node:
+    return node("multiply", Fraction(1, 3), name)
+
+
+def test_a_multiple_and_what_differs_from_it_by_a_number_are_one_word():
+    body = {"m": third_of("a"), "y": node("subtract", 2, "m"), "n": node("subtract", "m", Fraction(1, 3))}
+    body["w"] = node("multiply", "m", node("add", node("multiply", 3, "b"), "a"))
+    sum_of_all = node("add", "w", node("multiply", "y", "n"))
+    known = derived(program(body | {"z": sum_of_all}, {"a": 1, "b": 1}, "z"))
+    assert "m" not in known
+    assert dict(known["w_factor"].definition.terms) == {("b",): 1, ("a",): Fraction(1, 3)}
+    assert dict(known["y"].definition.terms) == {("a",): Fraction(-1, 3)} and known["y"].offset == 2
+    assert dict(known["n"].definition.terms) == {("y",): -1, (): Fraction(-1, 3)}
+
+
+def test_a_multiple_that_has_a_word_keeps_it():
+    body = {"m": third_of("a"), "x": node("multiply", "m", "m"), "y": node("subtract", 2, "m")}
+    known = derived(program(body | {"z": node("multiply", "y", "x")}, {"a": 1}, "z"))
+    assert dict(known["y"].definition.terms) == {("m",): -1}
+
+
+@pytest.mark.parametrize(
+    ("other", "terms"),
+    [
+        # Of 6 b and a/2, one is no shift; of 2 b and a/6 the other: the multiple takes no word then.
+        (
+            node("add", node("multiply", 6, "b"), node("multiply", Fraction(1, 2), "c")),
+            {"b": 2, "c": Fraction(1, 6)},
+        ),
+        (node("add", node("multiply", 3, "b"), "c"), {"b": 1, "c": Fraction(1, 3)}),
+        # Of b and c both are shifts, and b/3 and c/3 are none.
+        (node("add", "b", "c"), {"b": 1, "c": 1}),
+    ],
+)
+@pytest.mark.parametrize("turned", [False, True])
+def test_a_product_takes_no_multiple_where_shifts_do(other, terms, turned):
+    factors = (other, "m") if turned else ("m", other)
+    known = derived(program({"m": third_of("a"), "y": node("multiply", *factors)}, dict.fromkeys("abc", 1)))
+    assert dict(known["y_factor"].definition.terms) == {(name,): c for name, c in terms.items()}
+    assert ("m" in known) == (terms == {"b": 1, "c": 1})
+
+
 def test_the_root_of_a_number_lies_between_its_ends():
     root = derived(program({"r": node("sqrt", 2), "y": node("multiply", "r", "a")}, {"a": 1}))["r"]
     ((_, low),) = root.definition.terms

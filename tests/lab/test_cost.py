@@ -26,11 +26,18 @@ EXECUTED = {
     ("euler", "rv32imc"): 275,
     ("dcm", "cortex-m3"): 350,
 }
+#: Instructions of a call at most where the high words of products are taken alone, or those from half words.
+HIGH_PRODUCTS = {
+    ("high", "euler", "rv32imc"): 155,
+    ("high", "dcm", "rv32imc"): 320,
+    ("high", "euler", "cortex-m3"): 150,
+    ("half", "euler", "cortex-m0"): 760,
+}
 #: Instructions of a call on a Cortex-M3 that takes the counts of a gyro: a tenth more than 226, which the step on
 #: angles took once, and for direction cosines 15 % more than 520.
 COUNTS = {"euler": 248, "dcm": 598}
-#: Instructions of a step by a window of seven samples on either side on a Cortex-M3.
-WINDOW = 1250
+#: Instructions of a step by a window on a Cortex-M3.
+WINDOWS = {"window-7-7": 1250, "pair-1-8": 1050}
 
 HOST = Runner("host", ("cc",), ("env",), "cc", "gcc")
 
@@ -61,6 +68,15 @@ def test_a_call_executes_few_instructions(kernel, cpu):
 
 
 @pytest.mark.long
+@pytest.mark.parametrize(("multiply", "kernel", "cpu"), HIGH_PRODUCTS)
+def test_high_words_of_products_alone_execute_few_instructions(multiply, kernel, cpu):
+    needed(cpu)
+    settings = Settings.of(max_rate_deg_s=400, step="0.01", increments=2, multiply=multiply)
+    sources = pipeline.generate(pipeline.lower(pipeline.derive(kernel)), "c-fixed", settings)
+    assert 50 < cost.cost(sources, cpu).executed <= HIGH_PRODUCTS[multiply, kernel, cpu]
+
+
+@pytest.mark.long
 @pytest.mark.parametrize("kernel", COUNTS)
 def test_counts_of_a_gyro_cost_little_more_than_angles(kernel):
     needed("cortex-m3")
@@ -70,11 +86,12 @@ def test_counts_of_a_gyro_cost_little_more_than_angles(kernel):
 
 
 @pytest.mark.long
-def test_a_step_by_a_window_executes_few_instructions():
+@pytest.mark.parametrize(("window", "most"), WINDOWS.items())
+def test_a_step_by_a_window_executes_few_instructions(window, most):
     needed("cortex-m3")
     settings = Settings.of(max_rate_deg_s=400, step="0.01", increments=1)
-    sources = pipeline.compile(catalogue.choose_step("euler", "window-7-7", None), "c-fixed", settings)
-    assert 500 < cost.cost(sources, "cortex-m3").executed <= WINDOW
+    sources = pipeline.compile(catalogue.choose_step("euler", window, None), "c-fixed", settings)
+    assert 500 < cost.cost(sources, "cortex-m3").executed <= most
 
 
 def test_the_command_prints_its_json_keys(capsys):

@@ -45,9 +45,11 @@ def read_by_msvc(folder: Path, target: str, word: int | None = None) -> str:
         (folder / "system" / name).write_text(text)
     for name, text in sources.files.items():
         (folder / name).write_text(text)
-    language = ["-std=c++17", "-x", "c++"] if target.startswith("cpp") else ["-std=c11", "-x", "c"]
+    language = ["-std=c++14", "-x", "c++"] if target.startswith("cpp") else ["-std=c11", "-x", "c"]
     parts = [name for name in sources.files if name.endswith((".c", ".hpp"))]
     assert parts
+    (folder / "main.cpp").write_text("".join(f'#include "{name}"\n' for name in parts))
+    parts = ["main.cpp"] if target.startswith("cpp") else parts  # a header is not compiled by itself
     done = subprocess.run(
         ["clang", *MSVC, *language, *parts], cwd=folder, capture_output=True, text=True, check=False
     )

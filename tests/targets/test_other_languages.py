@@ -40,6 +40,8 @@ SETTINGS = [
     Settings(word=16, carry="all", rounding="truncation"),
     Settings(word=64, multiply="shift-add"),
     Settings(word=64, carry="full"),
+    Settings(word=32, multiply="high"),
+    Settings(word=32, multiply="half"),
 ]
 #: Kernels with roots, quotients, selections, products of wide numbers, several outputs and scalars.
 SOME = [("euler",), ("dcm-orthonormalize-optimal",), ("euler-from-dcm",), ("euler-normalize",)]
@@ -150,11 +152,13 @@ def written(folder: Path, target: str, settings: Settings | None = None) -> list
     return names
 
 
-def checked_cpp(folder: Path, text: str, *flags: str) -> subprocess.CompletedProcess[str]:
+def checked_cpp(
+    folder: Path, text: str, *flags: str, compiler: str = "c++"
+) -> subprocess.CompletedProcess[str]:
     """Let the C++ compiler check a program in a folder, with all warnings on."""
     (folder / "main.cpp").write_text(text)
     strict = ("-Wall", "-Wextra", "-Wpedantic", "-Wshadow", "-Wconversion", "-Wold-style-cast", "-Werror")
-    command = ["c++", "-std=c++17", *strict, "-ffp-contract=off", *flags, "-fsyntax-only", "main.cpp"]
+    command = [compiler, "-std=c++14", *strict, "-ffp-contract=off", *flags, "-fsyntax-only", "main.cpp"]
     return subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
 
 
@@ -169,11 +173,18 @@ def built_crate(
     return subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
 
 
-@pytest.mark.needs("c++")
-def test_headers_stand_in_one_program_of_a_strict_compiler(tmp_path):
+@pytest.mark.parametrize(
+    ("compiler", "standard"),
+    [
+        pytest.param(name, standard, marks=pytest.mark.needs(name))
+        for name, standard in (("g++", 14), ("g++", 17), ("clang++", 14))
+    ],
+)
+def test_headers_stand_in_one_program_of_a_strict_compiler(tmp_path, compiler, standard):
     names = [name for target in ("cpp", "cpp-float") for name in written(tmp_path, target)]
     names += [n for s in (SETTINGS[0], SETTINGS[3]) for n in written(tmp_path, "cpp-fixed", s)]
-    said = checked_cpp(tmp_path, "".join(f'#include "{name}"\n' for name in names) + "int main() {}\n")
+    text = "".join(f'#include "{name}"\n' for name in names) + "int main() {}\n"
+    said = checked_cpp(tmp_path, text, f"-std=c++{standard}", compiler=compiler)
     assert said.returncode == 0, said.stderr
 
 
@@ -222,6 +233,7 @@ def test_a_step_in_fixed_point_is_a_constant_expression(tmp_path, right, flags):
         f"    const int status = strapgen::{sources.function.name}({{{{{', '.join(map(str, state))}}}}},\n"
         f"        {{{{{', '.join(map(str, increments))}}}}}, next);\n    return status == 0 ? next[0] : 0;\n}}\n"
         f"static_assert(first() == {expected});\n",
+        "-std=c++17",
         *flags,
     )
     assert (said.returncode == 0) == right, said.stderr
@@ -240,6 +252,7 @@ def test_a_step_is_a_constant_expression(tmp_path, right):
         '#include "euler_rk4_2.hpp"\n'
         "constexpr auto next = strapgen::euler_rk4_2(strapgen::euler_rk4_2_identity, {{0.25, 0, 0, 0.125, 0, 0}});\n"
         f"static_assert(next[0] == {expected!r});\n",
+        "-std=c++17",
     )
     assert (said.returncode == 0) == right, said.stderr
     assert right or "static assertion failed" in said.stderr
@@ -258,7 +271,7 @@ def test_comment_of_a_constant_fits_the_width():
         (text,) = constants([Macro("ONE", value, meaning, "int")])
         return text.split("\n")
 
-    begin, comment = "inline constexpr int one = ", "/* one */"
+    begin, comment = "constexpr int one = ", "/* one */"
     for width in (99, 100):
         value = "1" * (width - len(f"{begin}; {comment}"))
         line = f"{begin}{value};"

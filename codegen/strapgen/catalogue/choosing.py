@@ -196,10 +196,6 @@ def _require_vector(
     if isinstance(spec, Window):
         if not vector.takes_windows:
             raise InputError(f"{name} goes with no window; allowed methods: {allowed}")
-        if spec.form == "pair" and name == "velocity-position":
-            raise InputError(
-                f"{name}: {spec.name} is a pair, which gives the attitude alone; a window as window-7-7 is needed"
-            )
         if spec.rotation != "fourth" and not vector.every:
             raise InputError(
                 f"{name}: {spec.name} computes a rotation, not its vector; {spec.name.removesuffix(EXACT)} does"

@@ -158,6 +158,14 @@ _VECTORS = {
         True,
         True,
     ),
+    "preintegrate": StepVector(
+        "preintegration: sums of a step with covariance and bias Jacobian",
+        "preintegration",
+        "step",
+        ("magnus", "munthe_kaas", "by_form"),
+        "coning-combined",
+        True,
+    ),
     **{
         f"{algorithm}-jacobian": StepVector(
             f"Jacobians of a step by state and increments: {words}",

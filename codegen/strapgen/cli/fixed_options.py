@@ -136,7 +136,8 @@ class FixedOptions:
         option(
             "--multiply",
             metavar="NAME",
-            help="How products with a constant are computed: product, or shift-add for sums of shifted terms.  "
+            help="How products are computed: product; shift-add for sums of shifted terms in place of those with a "
+            "constant; high for the high words of all products alone; half for those from half words.  "
             "[default: product]",
             read=names("strapgen.ir.formats:MULTIPLICATIONS"),
         ),
@@ -148,6 +149,16 @@ class FixedOptions:
             metavar="N",
             help="Signed digits of a constant with --multiply shift-add; fewer cost less and are less accurate.  "
             "[default: all]",
+        ),
+    ] = None
+    sums: Annotated[
+        _Text,
+        option(
+            "--sums",
+            metavar="NAME",
+            help="Order of the sums of targets in floating point: canonical, or tree for balanced trees.  "
+            "[default: canonical]",
+            read=names("strapgen.ir.fixed_settings:SUMS"),
         ),
     ] = None
     state: Annotated[
@@ -188,6 +199,8 @@ class FixedOptions:
     def settings(self, increments: int) -> Settings | None:
         """Return the settings of fixed point for so many increments a step; None if no option is stated."""
         given = {part.name: value for part in fields(self) if (value := getattr(self, part.name)) is not None}
+        if given.get("sums") == "canonical":  # no target takes anything else unless it is told
+            del given["sums"]
         if not given:
             return None
         from strapgen.ir.fixed_settings import Settings
@@ -197,10 +210,10 @@ class FixedOptions:
         return Settings.of(increments=increments, **given)
 
     def check_target(self, target: str) -> None:
-        """Refuse options that a target in floating point does not take: all but those of the largest numbers."""
+        """Refuse options that a target does not take: in floating point all but the largest numbers and --sums."""
         from strapgen.targets import TARGETS, fixed_targets
 
-        if not TARGETS[target].fixed and not {*stated(self)} <= _RANGE_OPTIONS:
+        if not TARGETS[target].fixed and not {*stated(self)} <= {*_RANGE_OPTIONS, "--sums"}:
             takers = " or ".join(fixed_targets())
             raise InputError(f"the options of fixed point go with --target {takers}, not with {target}")
 

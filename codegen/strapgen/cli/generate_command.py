@@ -199,7 +199,7 @@ def generate(
     output: SourceOptions,
     format: Format = "text",
 ) -> None:
-    """Generate source code for an algorithm, or for the whole catalogue.
+    """Generate source code for an algorithm, or for the catalogue.
 
     For the targets c-fixed and fixed-model, state the largest body rate and the step length. The formats and the
     error bounds then hold for all increments up to that rate. Targets in double and float take them too: series

@@ -20,7 +20,7 @@ REGISTRATION = Registration(
         "generate": Command(
             f"{__package__}.generate_command:generate",
             "Generate",
-            summary="Generate source code for an algorithm, or for the whole catalogue",
+            summary="Generate source code for an algorithm, or for the catalogue",
         ),
         "schema": Command(
             f"{__package__}.derive_commands:schema",

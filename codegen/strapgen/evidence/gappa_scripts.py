@@ -239,6 +239,9 @@ class _FixedScriptWriter:
             return
         self.script.define(f"s_{name}", total([part.computed for part in fine]))
         self.script.define(f"t_{name}", total([part.exact for part in fine]))
+        if definition.halves:
+            self._halves(value)
+            return
         before, added = self._added(value, definition)
         self.script.define(f"r_{name}", f"fixed<{-fraction},dn>({' + '.join([before, *added])})")
         self.script.define(f"c_{name}", total([*(part.computed for part in coarse), f"r_{name}"]))
@@ -247,6 +250,16 @@ class _FixedScriptWriter:
             moved = [f"(r_{name} - ({before} + {added[0]}))", *added, f"({before} - t_{name})"]
             self._rewrite(f"r_{name} - t_{name}", " + ".join(moved))
         self._expand(value, parts)
+
+    def _halves(self, value: Value) -> None:
+        """Add a high word from half words: up to two units, a whole number of them, below the product rounded down."""
+        name, place = value.name, value.fraction
+        self.script.define(f"r_{name}", f"fixed<{-place},dn>(s_{name})")
+        self.script.assume(f"d_{name}", Fraction(0), 2 * Fraction(2) ** -place)
+        self.script.hypotheses.append(f"@FIX(d_{name},{-place})")
+        self.script.define(f"c_{name}", f"r_{name} - d_{name}")
+        self.script.define(f"e_{name}", f"t_{name}")
+        self._rewrite(f"c_{name} - e_{name}", f"(r_{name} - t_{name}) - d_{name}")
 
     def _added(self, value: Value, definition: IntegerSum) -> tuple[str, list[str]]:
         """Return the fine terms of a sum before rounding, and the terms added to them."""

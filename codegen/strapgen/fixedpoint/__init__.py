@@ -16,21 +16,28 @@ __all__ = ["OPERATIONS", "FixedProgram", "Format", "Interface", "Settings", "can
 def quantize(program: Program, settings: Settings) -> FixedProgram:
     """Lower a program to integers."""
     from strapgen.fixedpoint.bounded_series import without_roots
-    from strapgen.fixedpoint.quantization import lowered
+    from strapgen.fixedpoint.quantization import finished, planned
     from strapgen.fixedpoint.sensor_scale import counted, in_counts
 
+    if any(signal.constraint == "covariance" for signal in program.inputs):
+        raise InputError(
+            f"{program.kernel} holds a covariance, which is computed in floating point alone; velocity-position and an "
+            "attitude step of the same method have the rest in fixed point"
+        )
     if settings.input_bits is not None and not counted(program):
         what = "an lsb" if settings.sensor is not None else "a number of input bits"
         raise InputError(f"{program.kernel} takes no increments; {what} does not go with it")
     counts = program if settings.sensor is None else in_counts(program, settings.sensor)
     try:
         series = without_roots(counts, settings)
+        one = planned(counts, settings)
         if series is not counts:
             with suppress(InputError):  # a word is too short for it
-                one, other = (lowered(code, settings, high=False).error_bounds for code in (counts, series))
-                if all(other[name] <= error for name, error in one.items()):
-                    return replace(lowered(series, settings), program=program)
-        return replace(lowered(counts, settings), program=program)
+                other = planned(series, settings)
+                bounds = other.fixed.error_bounds
+                if all(bounds[name] <= error for name, error in one.fixed.error_bounds.items()):
+                    return replace(finished(other), program=program)
+        return replace(finished(one), program=program)
     except InputError:
         raise
     except (ValueError, ArithmeticError) as error:  # a proof fails, as where a divisor may be zero

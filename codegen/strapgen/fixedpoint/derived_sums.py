@@ -16,6 +16,7 @@ from strapgen.fixedpoint.intervals import Interval
 from strapgen.fixedpoint.quantities import (
     Definition,
     InputElement,
+    Monomial,
     Operand,
     Quantities,
     Quantity,
@@ -25,6 +26,7 @@ from strapgen.fixedpoint.quantities import (
     is_dyadic,
     is_power_of_two,
     scaled,
+    used_by,
 )
 from strapgen.fixedpoint.ranges import Ranges
 from strapgen.ir.program import RESOLUTION, Constant, Node, Operation, Program, Reference
@@ -53,6 +55,8 @@ class DerivationContext:
     outputs: frozenset[str]  # assignments that hold elements of results
     #: Links of functions: equal ones are stored once.
     same: dict[Definition, str] = field(default_factory=dict)
+    #: Quantities of which another one is the word, times 1 or -1.
+    same_words: dict[str, tuple[str, Fraction]] = field(default_factory=dict)
     items: dict[str, Quantity] = field(init=False)  # those of `quantities`
     assigned: frozenset[str] = field(init=False)  # names of all assignments of the program
 
@@ -99,7 +103,8 @@ def stored_terms(context: DerivationContext, name: str) -> Terms:
         constant = quantity.offset + sum((c for _, c in definition.terms), Fraction(0))
         return {(): constant} if constant else {}
     offset: Terms = {(): quantity.offset} if quantity.offset else {}
-    return offset | dict(quantity.exact_addends) | {(name,): Fraction(1)}
+    word, sign = context.same_words.get(name, (name, Fraction(1)))
+    return offset | dict(quantity.exact_addends) | {(word,): sign}
 
 
 def samples(
@@ -224,6 +229,8 @@ def store(
         exact_addends, rest = _split(context, rest)
     if constant and not offset:
         rest[()] = constant
+    if offset and len(rest) == 1:
+        rest = _of_same_word(context, name, rest)
     note_samples(context, name, lambda values: _evaluate(rest, values))
     seen = float(np.nan_to_num(np.abs(context.anywhere[name]), posinf=0).max()) or 1e-300
     enclosure = context.ranges.of_sum(name, rest, seen)
@@ -291,12 +298,56 @@ def _product(context: DerivationContext, left: Terms, right: Terms, name: str) -
     for constant, terms in ((left, right), (right, left)):
         if set(constant) <= {()}:
             return scaled(terms, constant.get((), Fraction(0)))
+    left, right = _with_shifts(context, left, right)
     left, right = _factor(context, left, name), _factor(context, right, name)
     total: Terms = {}
     for one, a in left.items():
         for other, b in right.items():
             total = combined(total, {tuple(sorted(one + other)): a * b}, Fraction(1))
     return total
+
+
+def _of_same_word(context: DerivationContext, name: str, rest: Terms) -> Terms:
+    """Make one word of a multiple that nothing is made from yet and of what differs from it by a number and a sign."""
+    ((monomial, sign),) = rest.items()
+    base = _multiplied(context, monomial) if abs(sign) == 1 else None
+    if base is None or any(monomial[0] in used_by(item) for item in context.items.values()):
+        return rest
+    context.same_words[monomial[0]] = name, sign
+    return scaled(base, sign)
+
+
+def _multiplied(context: DerivationContext, monomial: Monomial) -> Terms | None:
+    """Return what a stored quantity is a multiple of, with the coefficient; None if it is no multiple."""
+    if len(monomial) != 1:
+        return None
+    quantity = context.items[monomial[0]]
+    match quantity.definition:
+        case Sum(((base, factor),)) if len(base) == 1:
+            exact = not (quantity.exact_addends or quantity.approximation_error or quantity.range_checked)
+            return {base: factor} if exact and quantity.name not in context.outputs else None
+    return None
+
+
+def _with_shifts(context: DerivationContext, left: Terms, right: Terms) -> tuple[Terms, Terms]:
+    """Return factors with the coefficient of a multiple in the other one where that takes no multiplication more.
+
+    Multiples by powers of two are shifts here, and the value is rounded once less than its multiple.
+    """
+    if len(left) > 1:
+        return (left, right) if len(right) > 1 else _with_shifts(context, right, left)[::-1]
+    ((monomial, coefficient),) = left.items()
+    base = _multiplied(context, monomial)
+    if base is not None and len(right) > 1:
+        ((name, factor),) = base.items()
+        moved = scaled(right, coefficient * factor)
+        if sum(map(_is_product, moved.items())) <= sum(map(_is_product, right.items())):
+            return {name: Fraction(1)}, moved
+    return left, right
+
+
+def _is_product(term: tuple[Monomial, Fraction]) -> bool:
+    return bool(term[0]) and not is_power_of_two(term[1])
 
 
 def _factor(context: DerivationContext, terms: Terms, name: str) -> Terms:

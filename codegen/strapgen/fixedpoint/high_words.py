@@ -35,6 +35,8 @@ _MOST_CHOICES, _MOST_WALKS = 12, 6
 _FAR = 0.25
 #: Registers that common processors have for words.
 _REGISTERS = 11
+#: Values that are refined together, and whether they are kept so.
+Step = tuple[frozenset[str], bool]
 #: A walk of the quantities with the most fraction bits of values, and its choices.
 Walk = Callable[[Quantities, Mapping[str, int], HighWords], Quantization]
 
@@ -97,35 +99,54 @@ def high_words(walk: Walk, quantities: Quantities, limits: Mapping[str, Fraction
     context = _at_one_place(walk, quantities, HighWords())
     if not all(limits.values()) or not any(_may_change(context, value) for value in context.body):
         return None
-    refused: set[frozenset[str]] = set()
-    taken: list[tuple[frozenset[str], bool]] = []
-    for _ in range(_MOST_CHOICES):
-        excess = _excess(context, limits)
-        if not excess:
-            break
-        steps = _steps(context, limits, excess, refused)
-        if not steps:
-            break
-        other = _at_one_place(walk, quantities, _with(context.high, steps))
-        if sum(_excess(other, limits).values()) < sum(excess.values()):
-            context, taken = other, taken + steps
-        else:  # it brings the products of other sums to a coarser place
-            refused.add(steps[0][0])
+    context, taken = _refined(walk, context, limits)
     if _excess(context, limits):
         return None
     for step in list(taken):  # what was refined early may do without, after others were
         fewer = [one for one in taken if one != step]
-        other = _at_one_place(walk, quantities, _with(None, fewer))
+        other = _at_one_place(walk, quantities, _with(HighWords(), fewer))
         if not _excess(other, limits):
             context, taken = other, fewer
     return _rounded_down(walk, context, limits)
 
 
-def _with(high: HighWords | None, steps: Iterable[tuple[frozenset[str], bool]]) -> HighWords:
+def high_products(walk: Walk, quantities: Quantities, limits: Mapping[str, Fraction]) -> Quantization:
+    """Return the walk in which every product is narrowed to its high word alone.
+
+    Values are refined until every result has an error within its limit, or as far as that goes.
+    """
+    context = _at_one_place(walk, quantities, HighWords(alone=True))
+    return _refined(walk, context, {name: limit for name, limit in limits.items() if limit})[0]
+
+
+def _refined(
+    walk: Walk, context: Quantization, limits: Mapping[str, Fraction]
+) -> tuple[Quantization, list[Step]]:
+    """Return a walk with values refined until its results are within their limits, and what was refined."""
+    assert context.high is not None
+    refused: set[frozenset[str]] = set()
+    taken: list[Step] = []
+    for _ in range(_MOST_CHOICES):
+        excess = _excess(context, limits)
+        steps = _steps(context, limits, excess, refused) if excess else []
+        if not steps:
+            break
+        other = _at_one_place(walk, context.quantities, _with(context.high, steps))
+        if sum(_excess(other, limits).values()) < sum(excess.values()):
+            context, taken = other, taken + steps
+        else:  # it brings the products of other sums to a coarser place
+            refused.add(steps[0][0])
+    return context, taken
+
+
+def _with(high: HighWords | None, steps: Iterable[Step]) -> HighWords:
     """Return choices with some values more that are fine, or kept where that is stated."""
-    high = high or HighWords()
+    assert high is not None
     for names, kept in steps:
-        high = replace(high, fine=high.fine | names, kept=high.kept | names if kept else high.kept)
+        fine = (
+            high.fine if high.alone else high.fine | names
+        )  # the places of high words alone are those of factors
+        high = replace(high, fine=fine, kept=high.kept | names if kept else high.kept)
     return high
 
 
@@ -175,14 +196,15 @@ def _steps(
     limits: Mapping[str, Fraction],
     excess: Mapping[str, float],
     refused: Container[frozenset[str]],
-) -> list[tuple[frozenset[str], bool]]:
+) -> list[Step]:
     """Return values to make as fine as words allow, and whether to keep them so; far from the limits several.
 
     Values of one format and of the same use, as the elements of a vector, are refined together. What is kept has its
     products shifted, which costs more: it comes last.
     """
     shares = _shares(context, {name: float(limits[name]) for name in excess})
-    for kept in (False, True):
+    assert context.high is not None
+    for kept in (True,) if context.high.alone else (False, True):
         alike: dict[tuple[int, int, str], dict[str, float]] = {}
         for value in context.body:
             bits = _bits_to_gain(context, value, kept)
@@ -222,12 +244,17 @@ def _bits_to_gain(context: Quantization, value: Value, kept: bool) -> int:
 def _may_change(context: Quantization, value: Value) -> bool:
     """Return whether a value is narrowed to a high word or shifted, in a format of its own."""
     total = value.definition
-    if not isinstance(total, IntegerSum) or not total.shift or value.name in context.plan.forced:
+    if not isinstance(total, IntegerSum) or value.name in context.plan.forced:
+        return False
+    if not total.shift and not (context.high and context.high.alone and value.error):
         return False
     if value.range_checked or value.name in context.feedback_names:
         return False
-    is_part = value.name not in context.quantities.items
-    return is_part or any(len(term.names) == 2 or term.coefficient is not None for term in total.fine)
+    items = context.quantities.items
+    return value.name not in items or any(
+        len(term.names) == 2 or term.coefficient is not None or any(name not in items for name in term.names)
+        for term in total.fine
+    )
 
 
 def in_order(body: Sequence[Value], results: Sequence[str], transition: Sequence[str]) -> list[Value]:

@@ -31,7 +31,7 @@ from strapgen.fixedpoint.quantities import (
 )
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.fixed_settings import Settings
-from strapgen.ir.formats import ROUNDINGS, Format, finest, from_digits, signed_digits
+from strapgen.ir.formats import LOST, ROUNDINGS, Format, finest, from_digits, signed_digits
 from strapgen.ir.integer_program import Coefficient, IntegerOperation, IntegerSum, Term, Value
 from strapgen.ir.interfaces import ErrorFeedback
 from strapgen.ir.program import Program
@@ -51,6 +51,7 @@ class HighWords:
         frozenset()
     )  # values not made coarser where products lie at other places: those are shifted
     down: frozenset[str] = frozenset()  # values rounded down, which takes no instruction
+    alone: bool = False  # whether every product is narrowed by itself, and sums are added up in words
 
 
 @dataclass(frozen=True)
@@ -267,7 +268,7 @@ class _Gathered:
     #: Multiples of words, each with the place of its longest coefficient: at any place below that.
     multiples: list[tuple[Monomial, Fraction, int]] = field(default_factory=list)
     #: Words times powers of two, which are shifted.
-    shifted: list[tuple[Monomial, Fraction, Placed]] = field(default_factory=list)
+    shifted: list[Placed] = field(default_factory=list)
     constant: Fraction = Fraction(0)
 
 
@@ -286,10 +287,10 @@ def _gathered(context: Quantization, name: str, definition: Sum) -> _Gathered:
             terms.products.append(_product_term(context, monomial, coefficient, words.get(monomial)))
         elif is_power_of_two(coefficient):
             item = _product_term(context, monomial, coefficient)
-            if context.values[monomial[0]].wide:
+            if context.values[monomial[0]].wide and not (context.high and context.high.alone):
                 terms.products.append(item)
             else:
-                terms.shifted.append((monomial, coefficient, item))
+                terms.shifted.append(item)
         else:
             most = context.values[word_of(context, monomial[0])].fraction + longest(coefficient, context.word)
             terms.multiples.append((monomial, coefficient, most))
@@ -301,7 +302,7 @@ def _top(context: Quantization, definition: Sum, terms: _Gathered, fraction: int
     tops = [*(item.place for item in terms.products), *(most for *_, most in terms.multiples)]
     if not tops:
         return None
-    after = {monomial for monomial, _, item in terms.shifted if item.place <= fraction}
+    after = {item.term.names for item in terms.shifted if item.place <= fraction}
     sizes = (
         abs(coefficient) * math.prod((context.size(name) for name in monomial), start=Fraction(1))
         for monomial, coefficient in definition.terms
@@ -314,7 +315,7 @@ def _unrounded(context: Quantization, quantity: Quantity, definition: Sum, follo
     """Return a sum that no word is needed of, with its products at one place."""
     terms = _gathered(context, quantity.name, definition)
     top = _top(context, definition, terms, 0)
-    placed = [*terms.products, *(item for *_, item in terms.shifted)]
+    placed = [*terms.products, *terms.shifted]
     if top is None:
         return _wide(context, quantity, _integer_terms(context, definition), followed)
     top = min(top, context.most.get(quantity.name, top))
@@ -344,12 +345,14 @@ def _narrowed(
     if top is not None and name not in high.fine:
         fraction = min(fraction, top - word)
     elif top is None and (not terms.constant or is_dyadic(terms.constant)):
-        fraction = min(fraction, max([item.place for *_, item in terms.shifted] or [fraction]))
+        fraction = min(fraction, max([item.place for item in terms.shifted] or [fraction]))
     fraction = context.plan.forced.get(name, fraction)
     products = list(terms.products)
     if top is not None:
-        if not products:
-            top = min(top, fraction + word)
+        beyond = top - word - fraction
+        narrowed = len(terms.products) + len(terms.multiples) + sum(i.place > fraction for i in terms.shifted)
+        if not products or (high.alone and beyond > 0 and narrowed * (1 - Fraction(1, 1 << beyond)) <= 1):
+            top = min(top, fraction + word)  # then nothing is left to round
         _note_wanted(context, products, top)
         products += [_multiple(context, monomial, c, top) for monomial, c, _ in terms.multiples]
     down = name in high.down
@@ -357,16 +360,17 @@ def _narrowed(
     while True:
         # The place of the high word, to which words are added before it is shifted on.
         high_place = fraction if top is None else max(fraction, top - word)
-        placed = list(products)
-        for monomial, coefficient, item in terms.shifted:
-            apart = item.place > high_place
-            placed.append(
-                _part(context, high, quantity, item, (monomial, coefficient), high_place) if apart else item
-            )
-        if terms.constant:
-            exact = (terms.constant * Fraction(2) ** fraction).denominator == 1
-            placed.append(_constant_at(terms.constant, fraction if exact else high_place))
-        value = _round(context, quantity, placed, fraction, followed, top, down)
+        if high.alone:
+            value = _of_words(context, high, quantity, terms, products, high_place, fraction, followed)
+        else:
+            placed = list(products)
+            for item in terms.shifted:
+                apart = item.place > high_place
+                placed.append(_part(context, high, quantity, item, high_place) if apart else item)
+            if terms.constant:
+                exact = (terms.constant * Fraction(2) ** fraction).denominator == 1
+                placed.append(_constant_at(terms.constant, fraction if exact else high_place))
+            value = _round(context, quantity, placed, fraction, followed, top, down)
         if value.magnitude <= context.largest(fraction):
             return value
         if forced:
@@ -375,6 +379,54 @@ def _narrowed(
         for part in context.body[before:]:
             del context.values[part.name]
         del context.body[before:]
+
+
+def _of_words(
+    context: Quantization,
+    high: HighWords,
+    quantity: Quantity,
+    terms: _Gathered,
+    products: Sequence[Placed],
+    place: int,
+    fraction: int,
+    followed: Fraction,
+) -> Value:
+    """Return a sum whose products are narrowed to their high words one by one and added up in words at a place.
+
+    The mean of what is cut off is in the constant of the sum.
+    """
+    word = context.word
+    halves = context.settings.multiply == "half"
+    if len(products) == 1 and not terms.shifted and not terms.constant and not halves:
+        shift = products[0].place - fraction
+        return _round(context, quantity, products, fraction, followed, down=shift == word)
+    placed: list[Placed] = []
+    constant, left = terms.constant, Fraction(0)
+    for unnarrowed in (*products, *terms.shifted):
+        item, mean = unnarrowed, Fraction(0)
+        if _is_multiplied(item.term):
+            bits = item.place - word if halves else min(item.place - word, place)
+            item = _part(context, high, quantity, item, bits)
+            mean = Fraction(LOST[context.settings.multiply], 2) * Fraction(2) ** -bits
+        if item.place > place or any(context.values[name].wide for name in item.term.names):
+            item = _part(context, high, quantity, item, min(item.place, place))
+            mean += Fraction(1, 2) * Fraction(2) ** -item.place
+        placed.append(replace(item, error=item.error - mean))
+        constant += mean * item.term.factor
+    if constant:
+        integer = nearest(constant * Fraction(2) ** place)
+        left = abs(integer / Fraction(2) ** place - constant)
+        if integer:
+            term = Term((), integer, coefficient=Coefficient(terms.constant, place))
+            placed.append(Placed(term, place, up(left)))
+        else:
+            placed[0] = replace(placed[0], error=placed[0].error + up(left))
+    return _round(context, quantity, placed, fraction, followed, place)
+
+
+def _is_multiplied(term: Term) -> bool:
+    """Return whether a term is a product, or a value times a number that is no shift."""
+    return len(term.names) == 2 or abs(term.factor) != 1
 
 
 def _note_wanted(context: Quantization, products: Sequence[Placed], top: int) -> None:
@@ -408,28 +460,35 @@ def _multiple(context: Quantization, monomial: Monomial, coefficient: Fraction, 
     return _product_term(context, monomial, coefficient, (factor, bits))
 
 
-def _part(
-    context: Quantization,
-    high: HighWords,
-    quantity: Quantity,
-    item: Placed,
-    term: tuple[Monomial, Fraction],
-    fraction: int,
-) -> Placed:
-    """Return a term that is a shifted value as one narrowed by itself, which is added to the high word."""
-    (factor,), coefficient = term
-    inside = context.quantities.items[factor].range.scale(abs(coefficient))
+def _part(context: Quantization, high: HighWords, quantity: Quantity, item: Placed, fraction: int) -> Placed:
+    """Return a term as one narrowed by itself, which is added to the high word or to others in words."""
     name = next(
         name
         for number in itertools.count(1)
         if (name := f"{quantity.name}_part{'' if number == 1 else f'_{number}'}") not in context.values
         and name not in context.quantities.items
     )
-    part = Quantity(name, quantity.definition, Fraction(0), inside)
-    shifted = replace(item, term=replace(item.term, factor=1))
-    value = _round(context, part, [shifted], fraction, down=name in high.down)
+    sign = 1 if item.term.factor > 0 or item.term.coefficient is not None else -1
+    term = replace(item.term, factor=sign * item.term.factor)
+    part = Quantity(name, quantity.definition, Fraction(0), _range_of(context, term, item.place))
+    down = high.alone or name in high.down
+    halves = context.settings.multiply == "half" and _is_multiplied(term)
+    value = _round(context, part, [replace(item, term=term)], fraction, down=down, halves=halves)
     context.add(value)
-    return Placed(Term((name,), item.term.factor), fraction, value.error)
+    return Placed(Term((name,), sign), fraction, value.error)
+
+
+def _range_of(context: Quantization, term: Term, place: int) -> Interval:
+    """Return the range of a multiple of one or two values, of which integers have so many fraction bits."""
+    items, inside = context.quantities.items, Interval.of(1)
+    for name in term.names:
+        value = context.values[name]
+        whole = Interval.symmetric(binary(value.magnitude, value.fraction))
+        inside = inside * (items[name].range if name in items else whole)
+    if len({*term.names}) < len(term.names):
+        inside = Interval(max(0, inside.low), inside.high)
+    places = sum(context.values[name].fraction for name in term.names) - place
+    return inside.scale(term.factor * Fraction(2) ** places)
 
 
 def _note_squares(context: Quantization, quantity: Quantity, definition: Sum) -> bool:
@@ -579,10 +638,12 @@ def _round(
     followed: Fraction = Fraction(0),
     top: int | None = None,
     down: bool = False,
+    halves: bool = False,
 ) -> Value:
     """Return a sum as a word of so many fraction bits.
 
-    `top` is the place at which what is rounded is added up, by default the finest; `down` rounds it down.
+    `top` is the place at which what is rounded is added up, by default the finest; `down` rounds it down; `halves` is
+    for one product, whose high word comes from half words.
     """
     word, values = context.word, context.values
     fine_terms = [item for item in terms if item.place > fraction]
@@ -604,6 +665,8 @@ def _round(
     # With error feedback, the result is off by what was left before and what is left now.
     roundings = 2 if feedback is not None else 1
     rounding_error = Fraction(1) if down else context.rounding_error
+    if halves:
+        rounding_error = Fraction(LOST["half"])
     error = fine.error + coarse.error + roundings * rounding_error / Fraction(2) ** fraction
     value = integer_value(
         context,
@@ -616,6 +679,7 @@ def _round(
             drop,
             in_words=coarse.peak + rounded_peak <= largest_word,
             down=down,
+            halves=halves,
         ),
         fraction,
         error,

@@ -18,7 +18,13 @@ from strapgen.fixedpoint.format_plan import (
     limits,
     sums_of_inputs_are_exact,
 )
-from strapgen.fixedpoint.high_words import high_words, in_order, with_exact_parts_apart
+from strapgen.fixedpoint.high_words import (
+    Walk,
+    high_products,
+    high_words,
+    in_order,
+    with_exact_parts_apart,
+)
 from strapgen.fixedpoint.integer_sums import (
     HighWords,
     Lowered,
@@ -35,12 +41,14 @@ from strapgen.fixedpoint.quantities import (
     Quantity,
     Sum,
     is_dyadic,
+    is_power_of_two,
     largest_wide,
     nearest,
 )
+from strapgen.fixedpoint.quantities import used_by as used_by_quantity
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.fixed_settings import Settings
-from strapgen.ir.formats import Format, finest
+from strapgen.ir.formats import LOST, Format, finest
 from strapgen.ir.integer_program import (
     FixedProgram,
     IntegerOperation,
@@ -62,25 +70,44 @@ _WORSE = Fraction(101, 100)
 _NARROWED = Fraction(61, 60)
 
 
-def lowered(program: Program, settings: Settings, high: bool = True) -> FixedProgram:
-    """Lower a program to integers; parameters and errors are those of `strapgen.fixedpoint.quantize`.
+@dataclass(frozen=True)
+class Planned:
+    """A program in integers before the search for high words, which takes most of the time."""
 
-    Without `high`, no sums are narrowed to high words, which takes most of the time to find.
-    """
+    quantities: Quantities
+    plan: FormatPlan
+    context: Quantization
+    fixed: FixedProgram
+
+
+def planned(program: Program, settings: Settings) -> Planned:
+    """Lower a program to integers; parameters and errors are those of `strapgen.fixedpoint.quantize`."""
     quantities, plan = _plan(program, settings)
     finest = _walk(program, settings, quantities, plan, {})
+    if settings.multiply in LOST:
+        context = _high_products(program, settings, quantities, plan, finest)
+        return Planned(quantities, plan, context, _fixed_program(context))
     coarser = aligning(finest.body, finest.values, plan.forced)
     shorter = _walk(program, settings, quantities, plan, coarser)
-    context, fixed = finest, _fixed_program(finest)
-    aligned = _fixed_program(shorter)
-    if not _is_worse(aligned, fixed):
-        context, fixed = shorter, aligned
-    if high and not settings.digits:
-        narrowed = _high_words(program, settings, quantities, plan, context)
+    one, other = (Planned(quantities, plan, walk, _fixed_program(walk)) for walk in (finest, shorter))
+    return one if _is_worse(other.fixed, one.fixed) else other
+
+
+def finished(planned: Planned) -> FixedProgram:
+    """Return the program, with sums narrowed to high words where that saves operations, and with its accumulation."""
+    context, fixed = planned.context, planned.fixed
+    if not context.settings.digits and context.settings.multiply != "high":
+        narrowed = _high_words(planned)
         if narrowed is not None:
             program_of = _fixed_program(narrowed)
             if sum(program_of.operations.values()) < sum(fixed.operations.values()):
                 context, fixed = narrowed, program_of
+    return _with_accumulation(context, fixed)
+
+
+def _with_accumulation(context: Quantization, fixed: FixedProgram) -> FixedProgram:
+    """Return a program with what its errors add up to in a run, where it is a step."""
+    program = context.program
     if program.attitude_step is None or program.transition is None:
         return fixed
     (result,) = fixed.interface.outputs
@@ -95,34 +122,77 @@ def lowered(program: Program, settings: Settings, high: bool = True) -> FixedPro
     return replace(fixed, interface=interface)
 
 
-def _high_words(
-    program: Program, settings: Settings, quantities: Quantities, plan: FormatPlan, other: Quantization
-) -> Quantization | None:
+def _high_words(planned: Planned) -> Quantization | None:
     """Return a walk that narrows sums to their high words, where that costs no more than a sixtieth in error."""
+    other, quantities, plan = planned.context, planned.quantities, planned.plan
+    program, settings = other.program, other.settings
     if other.resets:
         return None
+    outputs, transition = _result_names(program, quantities)
+    # Where the rounding of the state comes back in the next call, what adds up is the error of the transition.
+    limited = outputs if settings.carry == "none" else [*outputs, *transition]
+    limits = {name: other.values[name].error * _NARROWED for name in limited if name in other.values}
+
+    parted = with_exact_parts_apart(quantities, {*plan.words, *plan.forced})
+    try:
+        narrowed = high_words(_walks(program, settings, plan), parted, limits)
+    except (InputError, ArithmeticError):  # a word is too short, or a coarse divisor may be zero
+        return None
+    if narrowed is not None:
+        narrowed.body = in_order(narrowed.body, outputs, transition)
+    return narrowed
+
+
+def _high_products(
+    program: Program, settings: Settings, quantities: Quantities, plan: FormatPlan, finest: Quantization
+) -> Quantization:
+    """Return the walk that narrows every product to its high word, with an error of few times the finest."""
+    outputs, transition = _result_names(program, quantities)
+    # A product loses that much in place of half a unit.
+    times = 1 + LOST[settings.multiply]
+    limits = {name: times * finest.values[name].error for name in outputs if name in finest.values}
+    parted = with_exact_parts_apart(quantities, {*plan.words, *plan.forced})
+    # A sum of products is one of words, except where a root or a comparison takes it.
+    compared = {
+        name
+        for quantity in parted.items.values()
+        if not isinstance(quantity.definition, Sum)
+        for name in used_by_quantity(quantity)
+    }
+    multiplied = {
+        name
+        for name, quantity in parted.items.items()
+        if isinstance(quantity.definition, Sum)
+        and any(len(m) == 2 or (m and not is_power_of_two(c)) for m, c in quantity.definition.terms)
+    }
+    plan = replace(plan, words=plan.words | (multiplied - compared))
+    try:
+        context = high_products(_walks(program, settings, plan), parted, limits)
+    except InputError as error:
+        raise InputError(f"{error} with multiply {settings.multiply}") from None
+    context.body = in_order(context.body, outputs, transition)
+    return context
+
+
+def _walks(program: Program, settings: Settings, plan: FormatPlan) -> Walk:
+    """Return the walks of a plan, which share what comes out the same."""
+    known: dict[Hashable, Lowered] = {}
+
+    def walk(some: Quantities, most: Mapping[str, int], high: HighWords) -> Quantization:
+        return _walk(program, settings, some, plan, most, high, known)
+
+    return walk
+
+
+def _result_names(program: Program, quantities: Quantities) -> tuple[list[str], list[str]]:
+    """Return the quantities that hold elements of the outputs, and those of the transition."""
     results = {
         signal: [name for name in names if isinstance(name, str)]
         for signal, names in quantities.results.items()
     }
     outputs = [name for result in program.outputs for name in results[result.signal.name]]
     transition = [] if program.transition is None else results[program.transition.signal.name]
-    # Where the rounding of the state comes back in the next call, what adds up is the error of the transition.
-    limited = outputs if settings.carry == "none" else [*outputs, *transition]
-    limits = {name: other.values[name].error * _NARROWED for name in limited if name in other.values}
-
-    known: dict[Hashable, Lowered] = {}
-
-    def walk(some: Quantities, most: Mapping[str, int], high: HighWords) -> Quantization:
-        return _walk(program, settings, some, plan, most, high, known)
-
-    try:
-        narrowed = high_words(walk, with_exact_parts_apart(quantities, {*plan.words, *plan.forced}), limits)
-    except (InputError, ArithmeticError):  # a word is too short, or a coarse divisor may be zero
-        return None
-    if narrowed is not None:
-        narrowed.body = in_order(narrowed.body, outputs, transition)
-    return narrowed
+    return outputs, transition
 
 
 def _plan(program: Program, settings: Settings) -> tuple[Quantities, FormatPlan]:

@@ -12,7 +12,14 @@ from typing import Any, NamedTuple, TypedDict, TypeVar, Unpack
 
 from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError, InputTypeError
-from strapgen.ir.formats import MULTIPLICATIONS, SHORTEST_WORD, Format, check_rounding, check_word
+from strapgen.ir.formats import (
+    MULTIPLICATIONS,
+    SHORTEST_WORD,
+    WORDS_OF_HIGH_PRODUCTS,
+    Format,
+    check_rounding,
+    check_word,
+)
 from strapgen.ir.notebook_display import short_repr
 from strapgen.ir.read_only import ReadOnly
 from strapgen.ir.units import DEFAULT_BITS, Sensor
@@ -23,6 +30,12 @@ CARRIES = {
     "state": "the rounding of the state",
     "full": "the rounding of the state and of the transition",
     "all": "that, and the rounding of every other value that is handed on and of every increment that goes out",
+}
+
+#: The order in which targets in floating point add, and what that is in words.
+SUMS = {
+    "canonical": "one term after the other, as the formulas stand",
+    "tree": "as balanced trees, in other bits",
 }
 
 #: Formats of the state that hold no magnitude of 1, as CMSIS has them, with the word that each goes with.
@@ -70,6 +83,7 @@ class StatedSettings(TypedDict, total=False):
     state: str
     multiply: str
     digits: int
+    sums: str
 
 
 def with_settings(function: F) -> F:
@@ -122,9 +136,13 @@ class Settings(ReadOnly):
     state : str
         "q31", "q15" or "q63" for a state whose elements lie in -1 to 1 less a unit and saturate; "" for room above 1.
     multiply : str
-        How products with a constant are computed: "product" or "shift-add".
+        How products are computed: "product", "shift-add" for those with a constant, "high" for the high words of all
+        alone, with words of 32 or 64 bits, or "half" for high words from half words, with words of 32 bits.
     digits : int
         Canonical signed digits of a constant that "shift-add" takes; 0 for all that a word has.
+    sums : str
+        Order of the sums of targets in floating point: "canonical", or "tree" for balanced trees. Sums in fixed point
+        are exact before they are rounded, and have no other.
     increments : int or None
         The number of increments a step that `Settings.of` was told; a program with another number is refused.
     whole_step : tuple or None
@@ -155,6 +173,7 @@ class Settings(ReadOnly):
     state: str = ""
     multiply: str = "product"
     digits: int = 0
+    sums: str = "canonical"
     increments: int | None = field(default=None, compare=False, repr=False)
     whole_step: _WholeStep | None = None
 
@@ -167,10 +186,17 @@ class Settings(ReadOnly):
         check_rounding(self.rounding)
         checks.choice("carry", self.carry, CARRIES)
         checks.choice("multiply", self.multiply, MULTIPLICATIONS)
+        checks.choice("sums", self.sums, SUMS)
         digits = checks.count("digits", self.digits, smallest=0, largest=self.word)
         object.__setattr__(self, "digits", digits)
         if self.digits and self.multiply != "shift-add":
             raise InputError(f"digits is {self.digits}; it goes with multiply shift-add")
+        words = WORDS_OF_HIGH_PRODUCTS.get(self.multiply, (self.word,))
+        if self.word not in words:
+            allowed = " or ".join(map(str, words))
+            raise InputError(
+                f"multiply {self.multiply} goes with words of {allowed} bits; word is {self.word}"
+            )
         most = LARGEST_ANGLE * (1 if self.whole_step is None else _MOST_INCREMENTS)
         if not SMALLEST_ANGLE <= self.largest_angle <= most:
             # In the names of Python; the command line turns them into options again.
@@ -375,11 +401,17 @@ class Settings(ReadOnly):
 
     @property
     def only_ranges(self) -> bool:
-        """Whether they state the ranges of inputs and nothing that belongs to fixed point alone."""
+        """Whether they state the ranges of inputs or the order of sums, and nothing of fixed point alone."""
         fixed = replace(
-            self, largest_angle=DEFAULT_ANGLE, ranges={}, stated="", increments=None, whole_step=None
+            self,
+            largest_angle=DEFAULT_ANGLE,
+            ranges={},
+            stated="",
+            increments=None,
+            whole_step=None,
+            sums="canonical",
         )
-        return self.states_ranges and fixed == _DEFAULTS
+        return (self.states_ranges or self.sums != "canonical") and fixed == _DEFAULTS
 
     @property
     def states_ranges(self) -> bool:
@@ -442,6 +474,7 @@ class Settings(ReadOnly):
             "state": self.state,
             "multiply": self.multiply,
             "digits": self.digits,
+            **({} if self.sums == "canonical" else {"sums": self.sums}),
             **({} if self.whole_step is None else {"whole_step": list(self.whole_step)}),
         }
 

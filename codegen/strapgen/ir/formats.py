@@ -114,11 +114,17 @@ def check_rounding(rounding: str) -> str:
     return checks.choice("rounding", rounding, ROUNDINGS)
 
 
-#: How products with a constant are computed, and what that is in words.
+#: How products are computed, and what that is in words.
 MULTIPLICATIONS = {
     "product": "by the processor's multiplication",
     "shift-add": "as sums of shifted terms, by the canonical signed digits of the constant",
+    "high": "by the high words of all products alone, which are added up in words",
+    "half": "likewise, each high word from three products of half words, without that of the lower halves",
 }
+#: Words with which products are narrowed alone, by the way of that.
+WORDS_OF_HIGH_PRODUCTS = {"high": (32, 64), "half": (32,)}
+#: By how many units a high word is below the product at most: rounded down, and without the lower halves.
+LOST = {"high": 1, "half": 3}
 
 
 def signed_digits(value: int, most: int = 0) -> tuple[tuple[int, int], ...]:

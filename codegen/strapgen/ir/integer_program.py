@@ -52,11 +52,24 @@ class IntegerSum:
     in_words: bool = False
     #: Whether it is rounded down, as the certified error allows, where words are rounded to the nearest.
     down: bool = False
+    #: Whether it is one product, divided by 2**shift by `high_word_of_halves`; the shift is that of a word.
+    halves: bool = False
 
     def half(self, rounding: str) -> int:
         """Return half a unit of the result, which is added before the shift; 0 where nothing is."""
-        nearest = rounding == "nearest" and not self.down and self.residual is None
+        nearest = rounding == "nearest" and not (self.down or self.halves) and self.residual is None
         return 1 << (self.shift - 1) if self.shift and nearest else 0
+
+
+def high_word_of_halves(a: int, b: int, word: int) -> int:
+    """Return a b / 2**word, less by up to 3: without the product of the lower halves of two words.
+
+    >>> high_word_of_halves(-1, 1 << 31, 32), high_word_of_halves(65537, 65537, 32)
+    (-1, 1)
+    """
+    bits = word // 2
+    (a_high, a_low), (b_high, b_low) = divmod(a, 1 << bits), divmod(b, 1 << bits)
+    return a_high * b_high + (a_high * b_low >> bits) + (a_low * b_high >> bits)
 
 
 @dataclass(frozen=True)
@@ -145,6 +158,8 @@ def _sum_counts(total: IntegerSum, rounding: str) -> dict[str, int]:
     """Return the numbers of additions, multiplications and shifts of a sum."""
     terms = [*total.fine, *total.coarse]
     products = sum(len(t.names) == 2 or (abs(t.factor) != 1 and bool(t.names)) for t in terms)
+    if total.halves:
+        return {"add": 2, "multiply": 3, "shift": 2}
     additions = max(0, len(terms) - 1)
     shifts = sum(bool(term.shift) for term in terms) + bool(total.shift)
     if total.residual is not None:

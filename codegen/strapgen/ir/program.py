@@ -199,7 +199,7 @@ class Program:
     >>> from strapgen import algorithm
     >>> program = algorithm("euler", "rk4", 2).program()
     >>> program.operations["multiply"], program.temporaries
-    (38, 14)
+    (37, 15)
     """
 
     info: KernelInfo

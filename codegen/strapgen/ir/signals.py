@@ -48,7 +48,7 @@ class Signal:
         Largest magnitude of an element in proper use; None if the algorithm sets no limit.
     constraint : str
         Relation between the elements in proper use: "unit" (a vector of length 1), "rotation" (a rotation
-        matrix), or "" if there is none.
+        matrix), "covariance" (a triangle of one, which fixed point does not take), or "" if there is none.
     frame : str
         Frame of the components, a key of `FRAMES`; of an attitude "b to n", which turns components in the first frame
         into those in the second; "any" as for the unit; "" for scalars and for what has no frame.

@@ -53,7 +53,7 @@ def add_tangents(
         ]
         if not any(expressions):
             continue
-        if all(expression.is_Symbol or expression == 0 for expression in expressions):
+        if all(expression.is_Symbol or expression.is_number for expression in expressions):
             known |= dict(zip(elements, expressions, strict=True))
             continue
         signal = replace(

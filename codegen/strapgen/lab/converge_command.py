@@ -112,7 +112,7 @@ def converge(
     workers: WorkerOptions,
     output: Output,
 ) -> None:
-    """Measure the order of a step, and compare it with the predicted one.
+    """Measure the order of a step beside the predicted one.
 
     The order is the slope of the error on a ladder of step lengths. The back end exact computes with 40 digits and
     shows even high orders. Without --motion the runs are on a coning motion of about 1 rad/s with a steady rate added,

@@ -30,7 +30,7 @@ REGISTRATION = Registration(
         "converge": Command(
             f"{__package__}.converge_command:converge",
             "Analyse",
-            summary="Measure the order of a step, and compare it with the predicted one",
+            summary="Measure the order of a step beside the predicted one",
         ),
         "cost": Command(
             f"{__package__}.cost_command:cost",

@@ -30,6 +30,7 @@ from strapgen.ir.program import (
     walk,
 )
 from strapgen.kernel.polynomials import ONE, Polynomial, add, atom, multiply, scale
+from strapgen.lowering.share_multiples import share_multiples
 from strapgen.lowering.share_pairs import share_pairs
 from strapgen.lowering.trees import (
     REMEMBERED,
@@ -38,8 +39,11 @@ from strapgen.lowering.trees import (
     operation_count,
     plain,
     rewritten,
+    scaling,
     shared_names,
+    terms_of,
     uses,
+    with_constant,
     with_each,
     with_values,
 )
@@ -49,7 +53,7 @@ _EXACT = ("add", "subtract", "multiply", "divide", "negate")
 
 def fold_constants(program: Program) -> Program:
     """Replace operations on constants by their exact values."""
-    return with_values(_move_scalings(with_values(program, _fold)), _fold)
+    return with_values(_move_offsets(_move_scalings(with_values(program, _fold))), _fold)
 
 
 @lru_cache(REMEMBERED)
@@ -100,19 +104,6 @@ def _scaled_product(node: Operation) -> Node:
     return rest if coefficient > 0 else Operation("negate", (rest,))
 
 
-def scaling(node: Node) -> tuple[Fraction, Node | None]:
-    """Return a node as a factor and another node, which is None if the node is a number."""
-    if isinstance(node, Constant):
-        return node.value, None
-    if isinstance(node, Operation):
-        if node.kind == "negate":
-            coefficient, rest = scaling(node.arguments[0])
-            return -coefficient, rest
-        if node.kind == "multiply" and isinstance(node.arguments[0], Constant):
-            return node.arguments[0].value, node.arguments[1]
-    return Fraction(1), node
-
-
 def _move_scalings(program: Program) -> Program:
     """Move the constant factor of a temporary into its uses if all of these multiply it by constants."""
     scaled = {}
@@ -144,6 +135,34 @@ def _move_scalings(program: Program) -> Program:
         replace(a, value=rewritten(a.value, rule)) if moved.keys() & names_in(a.value) else a for a in body
     )
     return replace(program, body=body)
+
+
+def _move_offsets(program: Program) -> Program:
+    """Add a number at once to a name that differs from another one by a number; that name is rounded once less."""
+    offsets: dict[str, tuple[Fraction, tuple[bool, Reference]]] = {}
+    values = []
+    for assignment in program.body:
+        value, found = assignment.value, _offset(assignment.value)
+        if found is not None:
+            number, (positive, name) = found
+            if name.name in offsets:
+                other, (sign, name) = offsets[name.name]
+                number += other if positive else -other
+                positive = positive == sign
+                value = plain(with_constant([(positive, name)], number))
+            if number:
+                offsets[assignment.name] = number, (positive, name)
+        values.append(value)
+    return with_each(program, values)
+
+
+def _offset(node: Node) -> tuple[Fraction, tuple[bool, Reference]] | None:
+    """Return a sum as a number and a name with its sign; None if it is no such sum."""
+    if isinstance(node, Operation) and node.kind in ("add", "subtract"):
+        match sorted(terms_of(node), key=lambda term: isinstance(term[1], Reference)):
+            case [(sign, Constant(number)), (positive, Reference() as name)]:
+                return number if sign else -number, (positive, name)
+    return None
 
 
 _EVEN = ("cos", "sinc")
@@ -386,6 +405,7 @@ PASSES: tuple[Pass, ...] = (
     horner_schemes,
     reuse_values,
     share_pairs,
+    share_multiples,
     remove_unused,
 )
 

@@ -22,6 +22,7 @@ from strapgen.lowering.trees import (
     rewritten,
     shared_names,
     signed_sum,
+    terms_of,
     uses,
 )
 
@@ -201,19 +202,10 @@ def _flat(node: Node) -> Node | _Many:
     if not isinstance(node, Operation):
         return node
     if node.kind in ("add", "subtract"):
-        return _Many("add", [(sign, _flat(term)) for sign, term in _terms(node, True)])
+        return _Many("add", [(sign, _flat(term)) for sign, term in terms_of(node)])
     if node.kind == "multiply":
         return _Many("multiply", [(True, _flat(factor)) for factor in _factors(node)])
     return _Many(node.kind, [(True, _flat(argument)) for argument in node.arguments])
-
-
-def _terms(node: Node, sign: bool) -> Iterator[Term]:
-    if isinstance(node, Operation) and node.kind in ("add", "subtract"):
-        left, right = node.arguments
-        yield from _terms(left, sign)
-        yield from _terms(right, sign == (node.kind == "add"))
-    else:
-        yield sign, node
 
 
 def _factors(node: Node) -> Iterator[Node]:

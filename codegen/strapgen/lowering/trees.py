@@ -42,6 +42,16 @@ def signed_sum(terms: list[Term]) -> Term:
     return True, total
 
 
+def terms_of(node: Node, sign: bool = True) -> Iterator[Term]:
+    """Yield the terms of a sum with their signs; a node that is no sum is its own."""
+    if isinstance(node, Operation) and node.kind in ("add", "subtract"):
+        left, right = node.arguments
+        yield from terms_of(left, sign)
+        yield from terms_of(right, sign == (node.kind == "add"))
+    else:
+        yield sign, node
+
+
 def plain(term: Term) -> Node:
     """Return a term as one node, with a negation if it is subtracted."""
     positive, node = term
@@ -55,6 +65,19 @@ def scaled(coefficient: Fraction, node: Node) -> Term:
     if abs(coefficient) != 1:
         node = Operation("multiply", (Constant(abs(coefficient)), node))
     return coefficient > 0, node
+
+
+def scaling(node: Node) -> tuple[Fraction, Node | None]:
+    """Return a node as a factor and another node, which is None if the node is a number."""
+    if isinstance(node, Constant):
+        return node.value, None
+    if isinstance(node, Operation):
+        if node.kind == "negate":
+            coefficient, rest = scaling(node.arguments[0])
+            return -coefficient, rest
+        if node.kind == "multiply" and isinstance(node.arguments[0], Constant):
+            return node.arguments[0].value, node.arguments[1]
+    return Fraction(1), node
 
 
 def gathered(terms: Iterable[tuple[Fraction, Node]]) -> list[Term]:

@@ -20,7 +20,12 @@ REGISTRATION = Registration(
         "redundancy": Command(
             f"{__package__}.redundancy.redundancy_command:redundancy",
             "Generate",
-            summary="Derive parity equations and failure isolation of redundant sensors",
+            summary="Derive parity equations and failure isolation for sensors",
+        ),
+        "preintegrate": Command(
+            f"{__package__}.preintegration.preintegrate_command:preintegrate",
+            "Generate",
+            summary="Generate a C++ header that preintegrates stamped samples",
         ),
         "strapdown": Command(
             f"{__package__}.strapdown_command:strapdown",
@@ -51,6 +56,7 @@ REGISTRATION = Registration(
         "calibration": f"{__package__}.calibration:POSITIONS",
     },
     results={
+        "preintegration": f"{__package__}.preintegration.preintegration_sources:PreintegrationResult",
         "two-speed": f"{__package__}.two_speed.two_speed_command:TwoSpeedResult",
         "system": f"{__package__}.systems.system_report:SystemResult",
         "system-outputs": f"{__package__}.systems.system_runs:SystemCourseResult",

@@ -10,7 +10,7 @@ REGISTRATION = Registration(
         "report": Command(
             f"{__package__}.report_command:report",
             "Analyse",
-            summary="Write one HTML file with formulas, code, bounds, runs and evidence",
+            summary="Write one HTML file: formulas, code, bounds, runs and evidence",
         ),
     },
     requires=("lab", "design", "evidence", "thesis"),

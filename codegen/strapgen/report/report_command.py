@@ -115,7 +115,7 @@ def report(
     fixed: Annotated[FixedOptions, Shown(only=_FIXED)],
     output: Annotated[_ReportOutput, Shown(only=("out",))],
 ) -> None:
-    """Write one HTML file with formulas, code, bounds, runs and evidence.
+    """Write one HTML file: formulas, code, bounds, runs and evidence.
 
     The page is one file that opens anywhere, without a network. It holds the formulas and the code of each algorithm,
     its formats and error bounds in fixed point, its drift on a motion and the order that it shows, back ends side by

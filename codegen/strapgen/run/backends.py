@@ -22,18 +22,11 @@ from strapgen.ir.read_only import read_only
 from strapgen.ir.renamed import renamed, renamed_parameters
 from strapgen.ir.sources import Sources
 from strapgen.registry import Merged
-from strapgen.run.backend_names import (
-    BACKENDS,
-    DEFAULT_BACKENDS,
-    ORDERS,
-    SCANNING,
-    SEQUENTIAL,
-    Entry,
-    of_sources,
-)
+from strapgen.run.backend_names import BACKENDS, DEFAULT_BACKENDS, Entry, of_sources
 from strapgen.run.evaluators import Array, Evaluator, Loop, in_si
 from strapgen.run.increments import PART, run_parts
 from strapgen.run.kernel_sources import StepSources, sources_of_choice
+from strapgen.run.orders import ORDERS, SCANNING, SEQUENTIAL
 from strapgen.targets.registry import NUMPY, TARGETS
 
 __all__ = [
@@ -456,10 +449,12 @@ class Backend:
         if told and not np.isfinite(history[:, -1]).all():
             checks.require_finite("samples", samples, d)
         states = self._states(history).reshape(shape)
-        if out is None or np.may_share_memory(states, out):
+        if out is None:
             return states
-        out[...] = states
-        return np.asarray(out)
+        if not np.may_share_memory(states, out):
+            out[...] = states
+        result: Array = out
+        return result
 
     def propagate_parts(
         self,

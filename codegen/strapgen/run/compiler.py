@@ -147,7 +147,7 @@ C = Compiler(
     ("-std=c99", "-ffp-contract=off", "-g0", *_ANYWHERE, "-fvisibility=hidden"),
     ".c",
 )
-_CPP = ("-std=c++17", "-ffp-contract=off", "-g0", *_ANYWHERE, "-shared", "-fvisibility-inlines-hidden")
+_CPP = ("-std=c++14", "-ffp-contract=off", "-g0", *_ANYWHERE, "-shared", "-fvisibility-inlines-hidden")
 _RUST = ("--edition=2021", "--crate-type=cdylib", "--crate-name=strapgen", "-Cpanic=abort")
 #: The compilers of shared libraries by language.
 COMPILERS = {

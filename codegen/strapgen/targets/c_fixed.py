@@ -293,6 +293,8 @@ class StatementPrinter:
 
     def _sum(self, value: Value, definition: IntegerSum, kind: str, note: str) -> list[str]:
         name, wide = value.name, self.word.wide
+        if definition.halves:
+            return [self._declared(kind, name, self._half(definition), note)]
         fine = self._join([self.term(term) for term in definition.fine])
         if not definition.shift:
             terms = (*definition.coarse, *definition.fine)
@@ -330,6 +332,13 @@ class StatementPrinter:
             return [*lines, self._declared(kind, name, self.narrow(total, value, shift), note)]
         rounded = f"+{self._shifted(total, shift)}"
         return lines + self._result(value, kind, self._join([*coarse[:1], rounded, *coarse[1:]]), note)
+
+    def _half(self, definition: IntegerSum) -> str:
+        """Return a high word from half words."""
+        (term,) = definition.fine
+        self.uses.add("asr")
+        factor = [self.constant(term.factor) + _exactly(term, term.factor)] * (len(term.names) == 1)
+        return self._call("half", *term.names, *factor)
 
     def _result(self, value: Value, kind: str, text: str, note: str) -> list[str]:
         """Return the statements that store a sum; a word with a range check is checked before it is narrowed."""

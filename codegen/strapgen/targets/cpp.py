@@ -172,7 +172,7 @@ def _constant(definition: Macro, real: str) -> str:
         value = f"{{{definition.value}}}"
     else:
         value = f" = {definition.value}"
-    line = f"inline constexpr {kind} {definition.name.lower()}{value};"
+    line = f"constexpr {kind} {definition.name.lower()}{value};"
     comment = f"/* {definition.meaning} */"
     if len(line) > 99 and not definition.size:
         line = line.replace(" = ", " =\n    ")

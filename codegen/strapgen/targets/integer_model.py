@@ -92,6 +92,10 @@ def _sum(value: Value, definition: IntegerSum, fixed: FixedProgram, label: str) 
     if feedback is not None and definition.drop:
         lines.append(f'{name}_kept = _total("{label}", {value.peak}, {", ".join(fine)}) >> {definition.drop}')
         fine = [f"{name}_kept"]
+    if definition.halves:
+        (term,) = definition.fine
+        factors = [*term.names, *[str(term.factor)] * (len(term.names) == 1)]
+        return [f"{name} = _half({', '.join(factors)})"]
     if feedback is not None:
         fine.append(_shift(feedback.name, feedback.shift))
     elif half := definition.half(fixed.interface.settings.rounding):

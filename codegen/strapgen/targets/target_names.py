@@ -18,12 +18,12 @@ TARGETS = {
         language="C",
         folder="c_fixed",
     ),
-    "cpp": Target("C++17 in double: one header", f"{__package__}.cpp:emit", language="C++", number="double"),
+    "cpp": Target("C++14 in double: one header", f"{__package__}.cpp:emit", language="C++", number="double"),
     "cpp-float": Target(
-        "C++17 in float: one header", f"{__package__}.cpp:emit", language="C++", number="float"
+        "C++14 in float: one header", f"{__package__}.cpp:emit", language="C++", number="float"
     ),
     "cpp-fixed": Target(
-        "C++17 in fixed point: one header, constexpr, with the bits of the C",
+        "C++14 in fixed point: one header, constexpr, with the bits of the C",
         f"{__package__}.cpp:emit_fixed",
         fixed=True,
         words=(16, 32, 64),

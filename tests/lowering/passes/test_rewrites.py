@@ -14,6 +14,7 @@ from strapgen.lowering.passes import (
     horner_schemes,
     remove_unused,
     reuse_values,
+    share_multiples,
     share_pairs,
 )
 
@@ -101,6 +102,10 @@ REWRITTEN = {
         ("y = -x * (2 * z)", "y = -(2 * (x * z))"),
         ("y = -x * -z", "y = x * z"),
         ("y = 3 * -(2 * x)", "y = -(6 * x)"),
+        # What differs from a name by a number is no sum of a sum.
+        ("part = 2 - x; y = part + 1; z = q(3, 2) - part", "part = 2 - x; y = 3 - x; z = x - q(1, 2)"),
+        ("part = x + 1; other = part - 3; y = 2 - other", "part = x + 1; other = x - 2; y = 4 - x"),
+        ("part = x - 1; y = part + 1", "part = x - 1; y = x"),
         # A scaling moves through a name that is only scaled again, one name a time.
         (
             "shared_1 = 2 * (x + z); a = 3 * shared_1; b = shared_1 / 4 + z",
@@ -182,6 +187,42 @@ REWRITTEN = {
         ),
         ("y = sin(a * c + a * d) * x + x * z", "y = x * (sin(a * (c + d)) + z)"),
     ],
+    share_multiples: [
+        # The multiple is a factor where the other one needs fewer products then: 1 takes none, 2 a sum.
+        (
+            "w = q(1, 2) - q(1, 48) * a; y = a * (q(1, 24) * g - q(1, 128) * a - q(1, 8)) + 1",
+            "a_over_48 = q(1, 48) * a; w = q(1, 2) - a_over_48; y = a_over_48 * (g + g - q(3, 8) * a - 6) + 1",
+        ),
+        (
+            "y = (3 * b + 6 * c - 9) * a; w = 3 * a + b",
+            "a_times_3 = 3 * a; y = a_times_3 * (b + (c + c) - 3); w = a_times_3 + b",
+        ),
+        # What has a name is referred to by it; not where the name comes later.
+        ("part = 3 * a; y = a * (3 * b - 3 * c)", "part = 3 * a; y = part * (b - c)"),
+        (
+            "y = a * (3 * b - 3 * c); part = 3 * a",
+            "a_times_3 = 3 * a; y = a_times_3 * (b - c); part = a_times_3",
+        ),
+        (
+            "w = q(2, 3) * a + c; y = a * (q(2, 3) * b - q(4, 3)); a_over_3 = b + 1",
+            "a_times_2_over_3 = q(2, 3) * a; w = a_times_2_over_3 + c; y = a_times_2_over_3 * (b - 2); "
+            "a_over_3 = b + 1",
+        ),
+        # Names that are taken are not given again, and a multiple of a temporary is one.
+        (
+            "a_over_3 = b + 1; w = q(1, 3) * a + c; y = a * (q(1, 3) * b - 2)",
+            "a_over_3 = b + 1; shared_1 = q(1, 3) * a; w = shared_1 + c; y = shared_1 * (b - 6)",
+        ),
+        (
+            "shared_1 = b * b; w = 3 * shared_1 + c; y = shared_1 * (3 * b - 3)",
+            "shared_1 = b * b; shared_2 = 3 * shared_1; w = shared_2 + c; y = shared_2 * (b - 1)",
+        ),
+        # Of several multiples that with which most is saved is taken.
+        (
+            "v = 5 * a; w = 3 * a; y = a * (3 * b + 3 * c + 15 * d)",
+            "v = 5 * a; w = 3 * a; y = w * (b + c + 5 * d)",
+        ),
+    ],
 }
 #: Each factor has eight terms; multiplied out they would be hundreds, and x (...) would hardly be found.
 FACTOR = "(" + " + ".join("abcdefgh") + ")"
@@ -210,6 +251,12 @@ KEPT = {
         "y = select(at_least(a, b), c, d); z = select(at_least(a, b), d, c)",
         "y = sin(a + b); z = cos(b + a)",  # no equal trees: those are the work of share_pairs
     ],
+    share_multiples: [
+        *("w = 2 * a; y = a * (b + c)", "w = 3 * a; y = a * (b - 3 * c)", "y = a * (3 * b + 1)"),
+        "w = 3 * a; y = a * (3 * b + 3 * c + 1)",  # 1/3 would be rounded
+        "w = 3 * b; y = a * (3 * b + 3 * c)",  # a multiple of another value
+        "y = a * (3 * a + 3 * b)",  # the multiple stands in the product alone
+    ],
     remove_unused: [
         "shared_1 = x * x; y = select(at_least(shared_1, 2), x, z)",
         "part = x * x; y = part + 1",
@@ -222,7 +269,7 @@ KEPT = {
 }
 #: Texts of programs that a pass does not even copy.
 NOT_COPIED = {
-    **{run: KEPT[run] for run in (drop_copies, remove_unused, horner_schemes)},
+    **{run: KEPT[run] for run in (drop_copies, remove_unused, horner_schemes, share_multiples)},
     absorb_negations: ["y = a - b * c; w = cos(y) / 2"],
     fold_constants: ["y = x - z; w = sqrt(y) + 2"],
 }

@@ -8,7 +8,9 @@ part is nu, the change of phi when the increments change by those of the velocit
 Jacobian J(phi) nu = nu + (1 - cos x)/x^2 phi x nu + (x - sin x)/x^3 phi x (phi x nu), x = |phi|.
 
 The position changes by the integral of (1 - t) R f times the step: it is the velocity for the force (1 - t) f, whose
-samples are linear in those of f.
+samples are linear in those of f. A pair is right where rate and force have one frequency, as in sculling, and its
+position is half its velocity, the integral for the middle of the step, and what is odd about the middle, to second
+order in the rate: -a1/6 - c0 x (a0 + a1)/12 - c0 x (c0 x (a0/24 + a1/30)).
 """
 
 from __future__ import annotations
@@ -63,11 +65,9 @@ def step(method: Method, increments: int, previous: int = 0, ahead: int = 0) -> 
     The position is divided by the step length. Gravity and the velocity before the step are in neither.
     """
     build = KernelBuilder()
-    rate = _Rate(build, method, (increments, previous, ahead))
-    turn = _StepRotation(build, rate)
+    _, changes = changes_over_step(build, method, (increments, previous, ahead))
     for part, signal in CHANGES.items():
-        known = add_tangents(build, turn.stages, rate.changes[part](), part, "m/s")
-        build.output(signal, turn.velocity(known, part))
+        build.output(signal, changes[part])
     suffix, option, source = chosen(method, increments, previous, ahead)
     order = method.step_order(increments, previous, ahead)
     return build.kernel(
@@ -84,6 +84,46 @@ def step(method: Method, increments: int, previous: int = 0, ahead: int = 0) -> 
     )
 
 
+def changes_over_step(
+    build: KernelBuilder, method: Method, counts: tuple[int, int, int]
+) -> tuple[StepRotation, dict[str, sp.Matrix]]:
+    """Add stages for a step, and return its rotation and its changes by their names in `CHANGES`."""
+    rate = _Rate(build, method, counts)
+    turn = StepRotation(build, rate)
+    known = add_tangents(build, turn.stages, rate.changes["velocity"](), "velocity", "m/s")
+    changes = {"velocity": turn.velocity(known, "velocity")}
+    if rate.coefficients:
+        meaning = "velocity change over the step"
+        signal = Signal.vector("pushed", "pushed", unit="m/s", meaning=meaning)
+        changes["velocity"] = build.stage(signal, changes["velocity"])
+        changes["position"] = _position_by_pair(build, rate.coefficients, known, changes["velocity"])
+    else:
+        known = add_tangents(build, turn.stages, rate.changes["position"](), "position", "m/s")
+        changes["position"] = turn.velocity(known, "position")
+    return turn, changes
+
+
+def _position_by_pair(
+    build: KernelBuilder,
+    coefficients: tuple[sp.Matrix, ...],
+    changes: dict[sp.Symbol, sp.Expr],
+    velocity: sp.Matrix,
+) -> sp.Matrix:
+    """Return the position change from that of the velocity, the first two coefficients and the changes of all stages.
+
+    Half the velocity change is the integral for the middle of the step; what is left is odd about the middle.
+    """
+    a0, a1 = (vector.applyfunc(changes.__getitem__) for vector in coefficients)
+    c0 = coefficients[0]
+    lever = build.stage(
+        Signal.vector(
+            "position_lever", "position_lever", unit="m/s", meaning="what c_0 is crossed with twice"
+        ),
+        a0 / 24 + a1 / 30,
+    )
+    return velocity / 2 - a1 / 6 - cross(c0, (a0 + a1) / 12 + cross(c0, lever))
+
+
 class _Rate:
     """Samples of the body rate and of the specific force as a method takes them, for a window Legendre coefficients."""
 
@@ -95,7 +135,14 @@ class _Rate:
         changes: dict[sp.Symbol, sp.Expr] = dict(zip(angles, forces, strict=True))
         self.samples, self.method = samples, method
         self._vectors = [angles[k, :].T for k in range(angles.rows)]
-        if method.window is None:
+        #: Of a pair, its c_0 and c_1
+        self.coefficients: tuple[sp.Matrix, ...] = ()
+        if method.window is not None and method.window.form == "pair":
+            filtered = windowed.Filtered(build, samples, method.window)
+            self.coefficients = filtered.coefficient(0), filtered.coefficient(1)
+            changes = add_tangents(build, build.stages, changes, "velocity", "m/s")
+            self.method = windowed.method(method.window, filtered)
+        elif method.window is None:
             times = [Fraction(k, increments) for k in range(-previous, increments + ahead + 1)]
             remaining = samples.fit.times_remaining()
             self._weights = [remaining.integral(*ends) for ends in pairwise(times)]
@@ -149,39 +196,37 @@ def _of_coefficients(window: Window, degree: int) -> Method:
     return exponential(window.name, window.title, rotation_series.SOURCE, _POWER, rotation_vector)
 
 
-class _StepRotation:
+class StepRotation:
     """The rotation over a step under construction, and the velocity that follows from its change."""
 
     def __init__(self, build: KernelBuilder, rate: _Rate) -> None:
         begin = len(build.stages)
         self._build = build
-        self._vector = rate.method.rotation_vector is not None
+        self._by_vector = rate.method.rotation_vector is not None
         if rate.method.rotation_vector is not None:
-            self._turn = rate.method.rotation_vector(build, rate.samples)
+            self.vector = rate.method.rotation_vector(build, rate.samples)
         else:
-            self._turn = build.stage(
+            self.vector = build.stage(
                 EULER.transition, rate.method.transition(build, smooth(build, EULER, SERIES), rate.samples)
             )
         self.stages = tuple(build.stages[begin:])
-        if self._vector:
-            square = build.value(
-                "turn_square", dot(self._turn, self._turn), "square of the angle of the step"
+        if self._by_vector:
+            self.square = square = build.value(
+                "turn_square", dot(self.vector, self.vector), "square of the angle of the step"
             )
-            self._first = build.value("jacobian_1", algebra.wave_series(square, 2, SERIES), "(1 - cos x)/x^2")
-            self._second = build.value(
-                "jacobian_2", algebra.wave_series(square, 3, SERIES), "(x - sin x)/x^3"
-            )
+            self.first = build.value("jacobian_1", algebra.wave_series(square, 2, SERIES), "(1 - cos x)/x^2")
+            self.second = build.value("jacobian_2", algebra.wave_series(square, 3, SERIES), "(x - sin x)/x^3")
 
     def velocity(self, changes: dict[sp.Symbol, sp.Expr], name: str) -> sp.Matrix:
         """Return the velocity of a step from the changes of its rotation."""
-        dual = self._turn.applyfunc(changes.__getitem__)
-        if not self._vector:
-            conjugate = algebra.quaternion_conjugate(self._turn)
+        dual = self.vector.applyfunc(changes.__getitem__)
+        if not self._by_vector:
+            conjugate = algebra.quaternion_conjugate(self.vector)
             return 2 * algebra.quaternion_product(dual, conjugate)[:3, :]
         crossed = self._build.stage(
             Signal.vector(
                 f"{name}_cross", f"{name}_cross", unit="m/s", meaning=f"phi x change of phi, {name}"
             ),
-            cross(self._turn, dual),
+            cross(self.vector, dual),
         )
-        return dual + self._first * crossed + self._second * cross(self._turn, crossed)
+        return dual + self.first * crossed + self.second * cross(self.vector, crossed)

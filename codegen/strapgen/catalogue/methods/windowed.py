@@ -34,11 +34,11 @@ SERIES = 12
 _SQUARE = "angle_square"
 
 
-def method(window: Window) -> Method:
-    """Return the step by a window."""
+def method(window: Window, filtered: Filtered | None = None) -> Method:
+    """Return the step by a window, in a kernel that has its filters on them."""
 
     def rotation_vector(build: KernelBuilder, samples: Samples) -> sp.Matrix:
-        return build.stage(PHI, _rotation_vector(build, Filtered(build, samples, window)))
+        return build.stage(PHI, _rotation_vector(build, filtered or Filtered(build, samples, window)))
 
     def transition(build: KernelBuilder, kinematics: Kinematics, samples: Samples) -> sp.Matrix:
         phi = rotation_vector(build, samples)
@@ -46,7 +46,7 @@ def method(window: Window) -> Method:
         return kinematics.exponential(phi, SERIES, square)
 
     def exact_rotation(build: KernelBuilder, kinematics: Kinematics, samples: Samples) -> sp.Matrix:
-        rate = Filtered(build, samples, window)
+        rate = filtered or Filtered(build, samples, window)
         coefficients = [rate.coefficient(m) for m in range(window.degree + 1)]
         return polynomial_rotation.rotation(build, kinematics, coefficients, window.terms, window.increments)
 
@@ -100,6 +100,7 @@ class Filtered:
     def __init__(self, build: KernelBuilder, samples: Samples, window: Window) -> None:
         self._build, self._samples, self._window = build, samples, window
         self._folded: dict[tuple[int, int], sp.Matrix] = {}
+        self._known: dict[str, sp.Matrix] = {}
         self.degree: int = min(window.degree, DEGREE)
 
     def coefficient(self, m: int) -> sp.Matrix:
@@ -118,7 +119,12 @@ class Filtered:
         )
 
     def _sum(self, name: str, taps: Taps, m: int, meaning: str) -> sp.Matrix:
-        """Add a stage for the sum of the samples, each times its tap."""
+        """Add a stage for the sum of the samples, each times its tap, once."""
+        if name not in self._known:
+            self._known[name] = self._added(name, taps, m, meaning)
+        return self._known[name]
+
+    def _added(self, name: str, taps: Taps, m: int, meaning: str) -> sp.Matrix:
         if not self._window.parity:
             return self._samples.combination(name, [exact(tap) for tap in taps], meaning)
         sign, count = (-1) ** m, self._window.increments

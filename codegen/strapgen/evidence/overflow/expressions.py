@@ -128,6 +128,8 @@ class ExpressionFormulas:
         self.model, self.prover, self._calls, self._obligations = model, prover, calls, obligations
         self.place = ""
         self._fresh = 0
+        #: What was shifted down, by how much, and the result, where equal shifts are to have one result; else None
+        self.shifted: list[tuple[Any, int, Variable]] | None = None
 
     def variable(self, low: int, high: int, name: str = "t") -> Variable:
         """Return a new unknown."""
@@ -156,6 +158,8 @@ class ExpressionFormulas:
                 number = self._promote(self.value(node.expr, known))
                 assert number.kind.signed
                 return self._fit(number.kind, ~number.high, ~number.low, -number.real - 1, number.variables)
+            case c_ast.BinaryOp(op="&", left=c_ast.Cast() as cast, right=c_ast.Constant() as mask):
+                return self._low_bits(self.value(cast.expr, known), cast, mask)
             case c_ast.BinaryOp():
                 left, right = self.value(node.left, known), self.value(node.right, known)
                 return self._binary(node.op, left, right)
@@ -165,6 +169,19 @@ class ExpressionFormulas:
                 arguments = [self.value(argument, known) for argument in node.args.exprs]
                 return self._calls(node.name.name, arguments)
         raise NotImplementedError(f"{type(node).__name__} in {self.place}")
+
+    def _low_bits(self, number: Number, cast: c_ast.Cast, mask: c_ast.Constant) -> Number:
+        """Return the low bits of a number that is read as one without a sign, of a type that is no shorter."""
+        kind = self.model.named(tuple(cast.to_type.type.type.names))
+        places = self.model.literal(mask.value)[0].bit_length()
+        assert (
+            not kind.signed and self.model.literal(mask.value)[0] == (1 << places) - 1 and places <= kind.bits
+        )
+        result = self.variable(0, (1 << places) - 1, "low_bits")
+        above = self.floored(number, places)
+        equal = result.real == number.real - (1 << places) * above.real
+        result.facts.append(Fact(equal, number.variables | above.variables | {result}))
+        return Number.of(result, kind)
 
     def _promote(self, number: Number) -> Number:
         return number.as_type(self.model.promoted(number.kind))
@@ -234,9 +251,14 @@ class ExpressionFormulas:
         if number.exact:
             return Number.constant(number.low >> places, number.kind)
         unit = 1 << places
+        for known, bits, result in self.shifted or ():
+            if bits == places and known.eq(number.real):
+                return Number.of(result, number.kind)
         result = self.variable(number.low >> places, number.high >> places)
         rest = number.real - unit * result.real
         result.facts.append(Fact(z3.And(rest >= 0, rest <= unit - 1), number.variables | {result}))
+        if self.shifted is not None:
+            self.shifted.append((number.real, places, result))
         return Number.of(result, number.kind)
 
     def _quotient(self, kind: IntegerType, left: Number, right: Number) -> Number:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+import z3
 from pycparser import c_ast
 from pycparser.c_generator import CGenerator
 
@@ -98,6 +99,7 @@ class KernelStatements:
         self._prover = Prover(effort)
         self._open: list[Obligation] = []
         self._expressions = ExpressionFormulas(model, self._prover, self._call, self._open)
+        self._half_is_proved = False
         self.places: dict[str, set[int]] = {part: set() for part in ("fit", "shr", "asr")}
 
     def obligations(self) -> list[Obligation]:
@@ -259,13 +261,44 @@ class KernelStatements:
             places = inside["n"].low
             self.places[part].add(places)
             return self._expressions.converted(self._expressions.floored(inside["x"], places), kind)
+        if part == "half":
+            return self._half(function, inside, kind)
         if part == "rt":
             return self._expressions.rooted(inside["square"], kind, self._nearest)
+        return self._statements(function, inside, kind)
+
+    def _statements(self, function: c_ast.FuncDef, inside: dict[str, Number], kind: IntegerType) -> Number:
+        """Return the result of a function of the file by its statements."""
         *statements, last = function.body.block_items
         place = self._expressions.place
         self._block(statements, inside)
         self._expressions.place = place
         return self._expressions.converted(self._expressions.value(last.expr, inside), kind)
+
+    def _half(self, function: c_ast.FuncDef, inside: dict[str, Number], kind: IntegerType) -> Number:
+        """Return a high word from half words, which is proved to be below the product rounded down by up to two."""
+        unit = 1 << kind.bits
+        if not self._half_is_proved:
+            words = [self._expressions.variable(kind.low, kind.high, name) for name in "ab"]
+            known = {name: Number.of(word, kind) for name, word in zip("ab", words, strict=True)}
+            self._expressions.shifted = []
+            result = self._statements(function, known, kind)
+            self._expressions.shifted = None
+            lost = words[0].real * words[1].real - unit * result.real
+            self._half_is_proved = self._prover.holds(
+                Fact(z3.And(lost >= 0, lost < 3 * unit), result.variables | {*words})
+            )
+            if not self._half_is_proved:
+                self._open.append(
+                    Obligation(function.decl.name, "it must lie below the high word by up to 2")
+                )
+        a, b = inside["a"], inside["b"]
+        ends = [x * y for x in (a.low, a.high) for y in (b.low, b.high)]
+        product = Number(kind, min(ends), max(ends), a.real * b.real, a.variables | b.variables)
+        word, below = self._expressions.floored(product, kind.bits), self._expressions.variable(0, 2, "below")
+        variables = word.variables | {below}
+        result = Number(kind, word.low - 2, word.high, word.real - below.real, variables)
+        return self._expressions.converted(result, kind)
 
 
 def _items(node: Any) -> list[Any]:

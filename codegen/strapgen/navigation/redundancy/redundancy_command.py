@@ -45,7 +45,7 @@ def redundancy(
     output: Annotated[SourceOptions, Shown(only=("force",))],
     format: Format = "text",
 ) -> None:
-    """Derive parity equations and failure isolation of redundant sensors.
+    """Derive parity equations and failure isolation for sensors.
 
     Components of an axis are exact: whole numbers, decimals, or texts such as "2/3" and "sqrt(3)/2". You see the
     parity equations, the noise of every triad, and how many failures are isolated. With --out you get the code of all:
