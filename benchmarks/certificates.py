@@ -1,7 +1,4 @@
-"""Prints certificates of an hour at 100 Hz, beside the bounds of the headers, and the processor time that they take.
-
-    python benchmarks/certificates.py [--steps 360000] [--with-method]
-"""
+"""Prints certificates of an hour at 100 Hz, beside the bounds of the headers, and the processor time that they take."""
 
 from __future__ import annotations
 
