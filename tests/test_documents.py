@@ -229,7 +229,12 @@ def test_the_drifts_in_the_readme_are_those_of_its_command(capsys, monkeypatch):
 
 
 #: Pictures of the pages that a command on a page draws, by what its file of that command is called.
-DRAWN = {"cone-drift": "README", "orders": "paths/paper", "bounds": "paths/firmware"}
+DRAWN = {
+    "cone-drift": "README",
+    "orders": "paths/paper",
+    "bounds": "paths/firmware",
+    "word-length": "fixed-point",
+}
 
 
 @pytest.mark.long

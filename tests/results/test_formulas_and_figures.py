@@ -281,3 +281,12 @@ def test_paper_and_ink_change_places():
     greys = [on_dark(f"#{level:02x}{level:02x}{level:02x}") for level in range(0, 250, 10)]
     lights = [to_oklab(linear(grey))[0] for grey in greys]
     assert lights == sorted(lights, reverse=True)
+
+
+def test_a_title_keeps_its_lines_and_breaks_long_ones():
+    pytest.importorskip("matplotlib")
+    figure, _ = figures.grid_of_axes(1, 1, (2, 2))
+    figures.title(figure, "drift\nten seconds of a motion whose name is very long")
+    first, *others = figure.get_suptitle().splitlines()
+    assert first == "drift" and len(others) > 1
+    assert " ".join(others) == "ten seconds of a motion whose name is very long"

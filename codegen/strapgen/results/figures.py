@@ -103,8 +103,9 @@ def several_colours(count: int) -> list[str]:
 
 
 def title(figure: Any, text: str) -> None:
-    """Write a title at the left of a figure, on as many lines as its width needs."""
-    lines = textwrap.wrap(printable(text), int(figure.get_figwidth() * _CHARACTERS))
+    """Write a title at the left of a figure, each of its lines on as many as the width needs."""
+    width = int(figure.get_figwidth() * _CHARACTERS)
+    lines = [line for one in printable(text).splitlines() for line in textwrap.wrap(one, width)]
     figure.suptitle("\n".join(lines), fontsize=11, x=0.01, ha="left")
 
 

@@ -22,18 +22,11 @@ from strapgen.ir.read_only import read_only
 from strapgen.ir.renamed import renamed, renamed_parameters
 from strapgen.ir.sources import Sources
 from strapgen.registry import Merged
-from strapgen.run.backend_names import (
-    BACKENDS,
-    DEFAULT_BACKENDS,
-    ORDERS,
-    SCANNING,
-    SEQUENTIAL,
-    Entry,
-    of_sources,
-)
+from strapgen.run.backend_names import BACKENDS, DEFAULT_BACKENDS, Entry, of_sources
 from strapgen.run.evaluators import Array, Evaluator, Loop, in_si
 from strapgen.run.increments import PART, run_parts
 from strapgen.run.kernel_sources import StepSources, sources_of_choice
+from strapgen.run.orders import ORDERS, SCANNING, SEQUENTIAL
 from strapgen.targets.registry import NUMPY, TARGETS
 
 __all__ = [
@@ -194,6 +187,11 @@ class Backend:
     def nodes(self) -> tuple[float, ...]:
         """Nodes at which a step takes the rate, as fractions of its length; empty if it takes increments."""
         return self._parts.nodes
+
+    @property
+    def choice(self) -> Choice | None:
+        """The choice of the step; None where its sources do not tell it."""
+        return self._parts.choice
 
     def companion(self, kernel: str) -> Evaluator:
         """Return another kernel on the same target as the step: one that restores a state, or converts it.
