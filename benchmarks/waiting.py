@@ -19,7 +19,7 @@ ROOT = Path(__file__).resolve().parents[1]
 #: The version before steps took one sample where it lies, and commands imported less.
 BEFORE = "85523899"
 #: Back ends whose step is called, each with the most microseconds that it may take.
-STEPS = {"c": 3.0, "c-float": 3.0, "numpy": None}
+STEPS = {"c": 3.0, "c-float": 3.0, "c-fixed32": 10.0, "numpy": None}
 #: Prints the microseconds of a step that Python calls on arrays of the back end's own type.
 STEP = """
 import sys, time

@@ -16,7 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 import strapgen
-from strapgen.catalogue.methods.window import GyroResponse, Window
+from strapgen.catalogue.methods.sensor_response import Response
+from strapgen.catalogue.methods.window import Window
 from strapgen.catalogue.methods.windows import WINDOWS
 from strapgen.design.family import FamilyBrief, design
 from strapgen.design.filters import responses
@@ -45,7 +46,11 @@ def stepper(method: str | Window, count: int = 1, previous: int | None = None) -
 @cache
 def window(band: str, gyro_hz: str = "") -> Window:
     """Return a window of seven samples on each side for a band in rad a sample, and for a gyro."""
-    gyro = GyroResponse(Fraction(gyro_hz), Fraction(7071, 10000), Fraction(100)) if gyro_hz else None
+    gyro = (
+        Response(frequency_hz=Fraction(gyro_hz), damping=Fraction(7071, 10000), sample_hz=Fraction(100))
+        if gyro_hz
+        else None
+    )
     if band == "1.3" and gyro is None:
         return WINDOWS["window-7-7"]
     brief = FamilyBrief(7, 7, Fraction(band), conditions=2 if gyro else 4, gyro=gyro)

@@ -53,16 +53,22 @@ def compile(
     if targets.TARGETS[target].fixed:
         chosen = (settings or _DEFAULTS).for_program(choice.increments, choice.kernel)
         return generate(naming.of(fixed_program(choice, chosen)), target)
-    return generate(naming.of(_declared(program(choice), target, settings)), target)
+    return generate(naming.of(declared(program(choice), target, settings)), target)
 
 
-def _declared(program: Program, target: str, settings: Settings | None) -> Program:
-    """Return a program for a target in floating point, with the ranges that settings declare."""
+def declared(program: Program, target: str, settings: Settings | None) -> Program:
+    """Return a program for a target in floating point, with the ranges and the sums that settings declare."""
     if settings is None:
         return program
-    from strapgen.fixedpoint.bounded_series import with_declared_ranges
+    if settings.states_ranges:
+        from strapgen.fixedpoint.bounded_series import with_declared_ranges
 
-    return with_declared_ranges(program, settings, targets.TARGETS[target].number or "double")
+        program = with_declared_ranges(program, settings, targets.TARGETS[target].number or "double")
+    if settings.sums == "tree":
+        from strapgen.lowering.tree_sums import with_tree_sums
+
+        program = with_tree_sums(program)
+    return program
 
 
 @cached("fixed-programs", "integers of {0.kernel}")
@@ -182,14 +188,18 @@ def quantize(program: Program, settings: Settings | None = None) -> FixedProgram
     _require_settings(settings)
     with timed("quantize", program.kernel):
         chosen = (settings or _DEFAULTS).for_program(program.increments_per_step, program.kernel)
+        if chosen.sums != _DEFAULTS.sums:
+            raise InputError(
+                f"sums {chosen.sums} goes with targets in floating point; sums in fixed point are exact"
+            )
         return fixedpoint.quantize(program, chosen)
 
 
 def generate(program: Program | FixedProgram, target: str, settings: Settings | None = None) -> Sources:
     """Turn a program into source text; for a fixed-point target a `Program` is quantized first.
 
-    In floating point, settings that state ranges alone declare them: bounds are those of the ranges, and series take
-    the place of the root, the cosine and the sine of a length whose range they bound.
+    In floating point, settings may state ranges and the order of sums alone: bounds are those of the ranges and of the
+    order, and series take the place of the root, the cosine and the sine of a length whose range they bound.
 
     Parameters
     ----------
@@ -197,7 +207,8 @@ def generate(program: Program | FixedProgram, target: str, settings: Settings | 
     target : str
         A key of `strapgen.TARGETS`: one that ``strapgen list`` shows, of an installed package too.
     settings : Settings, optional
-        Word, ranges and rounding for a `Program` and a fixed-point target; ranges alone for one in floating point.
+        Word, ranges and rounding for a `Program` and a fixed-point target; ranges and sums alone for one in floating
+        point.
 
     Raises
     ------
@@ -217,7 +228,7 @@ def generate(program: Program | FixedProgram, target: str, settings: Settings | 
     if isinstance(program, Program) and targets.TARGETS[target].fixed:
         program = quantize(program, settings)
     elif isinstance(program, Program):
-        program = _declared(program, target, settings)
+        program = declared(program, target, settings)
     elif settings is not None:
         kernel = program.program.kernel
         raise InputError(f"the program of {kernel} is quantized already; settings do not go with it")

@@ -199,7 +199,7 @@ def test_a_gyro_shows_the_algorithm_other_angles_than_the_true_ones():
     choice = choose_step("euler", "coning-compressed", 3)
     gain = 1 / (1 - 0.25**2 + 2j * 0.7 * 0.25)
     tones = [Tone(10, (-0.01j, -0.02j * cmath.exp(0.7j), 0), gain)]
-    seen = vibration.through_gyro(vibration.of(choice), 40, "0.7")
+    seen = vibration.through_gyro(vibration.of(choice), "second-order:40:0.7")
     expected = seen.rates(10, "0.02", theta_x="0.01", theta_y="0.02", phase="0.7").error
     assert rectified(choice, "0.02", tones).at([0.0], 2)[2] == pytest.approx(expected, rel=1e-9)
 

@@ -39,7 +39,7 @@ def run(capsys, tmp_path, monkeypatch):
         (f"worst {SPECTRUM}", {"worst_deg_h", "worst_annulling_deg_h"}),
         ("band --band 1.3 --products 1", {"largest_rad_step"}),
         (f"random {SPECTRUM} --noise-rad 1e-6 --pulse-rad 1e-6", {"random_deg_h", "random_annulling_deg_h"}),
-        (f"worst {SPECTRUM} --gyro-bandwidth-hz 40 --gyro-damping 0.7071", {"worst_deg_h"}),
+        (f"worst {SPECTRUM} --response butterworth:3:40+instants", {"worst_deg_h"}),
     ],
 )
 def test_a_design_is_shown_with_its_drift_and_written_as_a_file(run, options, keys, tmp_path):
@@ -91,7 +91,7 @@ def test_a_design_goes_wherever_a_method_goes(run, tmp_path):
         ("band --band 1 --noise-rad 1e-6", "--noise-rad needs --objective random"),
         (
             "band --band 1 --sample-hz 100",
-            "--sample-hz needs --band-hz, --gyro-bandwidth-hz or --spectrum",
+            "--sample-hz needs --band-hz, --response, --gyro-bandwidth-hz or --spectrum",
         ),
         ("band --band 1 --powers 4", "--powers is 4; a whole number from 0 to 3 is needed"),
         ("band --band 1 --products 3", "the conditions on 3 coefficients contradict each other"),
@@ -275,7 +275,9 @@ def test_fixed_point_takes_formats_that_hold_the_errors(in_folder):
             f"simulate euler {MOTION} --step 0.02 --specific-force 0,0,1",
             "--specific-force goes with a described",
         ),
-        (f"{VIBRATION} --gyro-bandwidth-hz 80,60,40 --gyro-damping 1", "one number or two with a comma"),
+        (f"{VIBRATION} --gyro-bandwidth-hz 80,60,40 --gyro-damping 1", "one or two with a comma"),
+        (f"{VIBRATION} --response bessel:9:40", "--response.order is 9; a whole number from 1 to 8"),
+        (f"{VIBRATION} --response bessel:2:40 --gyro-bandwidth-hz 80 --gyro-damping 1", "do not go together"),
         (f"{VIBRATION} --gyro-bandwidth-hz 80,0 --gyro-damping 1", "gyro-bandwidth-hz is 0"),
         ("simulate euler --recording inc.csv --errors force.toml", "no velocity increments"),
         (

@@ -75,8 +75,9 @@ def written(tmp_path, text):
 
 
 def test_a_brief_is_read_exactly(tmp_path):
-    brief = read_brief(written(tmp_path, GOOD))
-    assert brief.gyro.damping == Fraction(7, 10) and brief.gyro.pulse_arcsec == Fraction(1, 2)
+    with pytest.warns(DeprecationWarning, match="gyro.bandwidth_hz is now gyro.response"):
+        brief = read_brief(written(tmp_path, GOOD))
+    assert brief.gyro.seen.words == "second-order:80:0.7" and brief.gyro.pulse_arcsec == Fraction(1, 2)
     assert brief.environment == LineEnvironment((Line(20.0, 3e-4, 2e-4, 1.5),))
     assert (brief.budget.over_s, brief.budget.software_share, brief.processor.word) == (3600, 0.1, 16)
 

@@ -84,7 +84,7 @@ sample_hz = 200
 [budget]
 drift_deg_h = 1
 """
-GYRO = "bandwidth_hz = 60\ndamping = 0.6"
+GYRO = 'response = "second-order:60:0.6"'
 #: Frequencies of lines that add up, in two ways; the last ones to whole periods in a step of two samples.
 FREQUENCIES = [("6", "12", "18"), ("4.5", "13.5", "9"), ("41.5", "58.5")]
 

@@ -9,7 +9,7 @@ from fractions import Fraction
 import pytest
 from c_programs import COMPILERS, complaints, needed, written
 
-from strapgen.catalogue.methods.window import GyroResponse
+from strapgen.catalogue.methods.sensor_response import Response
 from strapgen.catalogue.methods.windows import WINDOWS
 from strapgen.design.commit_late.commit_late_sources import NORMALIZATIONS, TARGETS, family, kernels, sources
 from strapgen.evidence import clang_checks
@@ -19,7 +19,9 @@ from strapgen.pipeline import program
 from strapgen.run.standard_tree import command_of
 
 WINDOW = WINDOWS["window-3-3"]
-GYRO = replace(WINDOW, gyro=GyroResponse(Fraction(40), Fraction(7, 10), Fraction(100)))
+GYRO = replace(
+    WINDOW, gyro=Response(frequency_hz=Fraction(40), damping=Fraction(7, 10), sample_hz=Fraction(100))
+)
 UNITS = [(a, t) for a in NORMALIZATIONS for t in TARGETS]
 
 

@@ -143,7 +143,7 @@ def test_a_win_by_errors_that_cancel_is_said_to_be_fragile(tmp_path):
 
 
 def test_errors_of_a_line_are_those_of_the_step_and_of_the_gyro(tmp_path):
-    gyro = "[gyro]\nbandwidth_hz = 80\ndamping = 0.7\n"
+    gyro = '[gyro]\nresponse = "second-order:80:0.7"\n'
     path, brief, ordered = judged(tmp_path, STRONG.replace("[gyro]\n", gyro), ["coning-compressed:3"])
     step, of_gyro = algorithm_named(ordered[0], brief, path).line_errors()
     plain = judged(tmp_path, STRONG, ["coning-compressed:3"])

@@ -18,8 +18,8 @@ from strapgen.analysis.vibration import Spectrum
 from strapgen.catalogue.methods import coning_drift, shaped_coning
 from strapgen.catalogue.methods.coning_coefficients import Design
 from strapgen.catalogue.methods.coning_drift import ConingShape
+from strapgen.catalogue.methods.sensor_response import Response
 from strapgen.catalogue.methods.shaped_coning import SHAPES, ShapedConing
-from strapgen.catalogue.methods.window import GyroResponse
 from strapgen.design import coning_design
 from strapgen.design.coning_design import ConingBrief, Lines, annulling, design, of_spectrum, written
 from strapgen.design.filters.band_grid import REAL
@@ -29,7 +29,7 @@ from strapgen.lab.motions.rate_profiles import CosineSum, ReferenceAttitude
 from strapgen.lab.runs import steady_drift
 
 BAND = Fraction(13, 10)
-GYRO = GyroResponse(Fraction(40), Fraction(7071, 10000), Fraction(100))
+GYRO = Response(frequency_hz=Fraction(40), damping=Fraction(7071, 10000), sample_hz=Fraction(100))
 #: Frequencies in Hz of the published designs; sampling is at 100 Hz.
 HERTZ = np.linspace(0.25, 49.75, 400)
 

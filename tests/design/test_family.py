@@ -11,7 +11,7 @@ import pytest
 import strapgen
 from strapgen.analysis.vibration.spectrum import Spectrum
 from strapgen.catalogue.methods import windows
-from strapgen.catalogue.methods.window import GyroResponse
+from strapgen.catalogue.methods.sensor_response import Response
 from strapgen.design import family
 from strapgen.design.family import FamilyBrief, design
 from strapgen.design.filters import responses
@@ -19,7 +19,7 @@ from strapgen.design.filters.band_grid import BITS, ONE
 from strapgen.ir.exceptions import InputError
 from strapgen.lab.runs import drift
 
-GYRO = GyroResponse(Fraction(40), Fraction(7071, 10000), Fraction(100))
+GYRO = Response(frequency_hz=Fraction(40), damping=Fraction(7071, 10000), sample_hz=Fraction(100))
 SMALL = FamilyBrief(2, 2, Fraction(1), conditions=3, degree=2)
 
 BRIEFS = {

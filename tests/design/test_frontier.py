@@ -178,6 +178,30 @@ def test_a_users_motion_stands_alone():
     assert "drift on coning, a_rad_s=1, b_rad_s=1.5, g_rad_s=0.6" in text and "drift on cones" not in text
 
 
+def test_sensors_with_errors_leave_what_their_samples_are_off_by(tmp_path):
+    mine = {"cone": ("cone", {"half_angle_deg": "1", "frequency_hz": "20"})}
+    several, drifts = candidates(["window-7-7", "coning-compressed:1+1"]), {}
+    for name, text in {
+        "exact": "",
+        "pulses": "[gyro]\npulse_arcsec = 5",
+        "jitter": "[sampling]\njitter_s = 1e-4",
+    }.items():
+        (tmp_path / f"{name}.toml").write_text(text)
+        errors = str(tmp_path / f"{name}.toml")
+        found = in_order(frontier.frontier(several, "100", "6", jobs=1, motions=mine, errors=errors), several)
+        drifts[name] = [one.drifts["cone"] for one in found]
+    window, classic = drifts["exact"]
+    assert window < 1e-3 and classic == pytest.approx(270, rel=0.1)
+    assert 0.3 < drifts["pulses"][0] < 5  # docs/windows.md, of 60 s: 1.4
+    assert 0.1 < drifts["jitter"][0] < 9
+    assert drifts["pulses"][1] == pytest.approx(classic, rel=0.1)
+    report = FrontierResult(found, 100.0, 6.0, mine, errors)
+    assert "increments at 100 Hz of sensors with errors" in report.written("text")
+    assert frontier.identity("100", "6", mine, errors) != frontier.identity("100", "6", mine)
+    with pytest.raises(InputError, match="cannot be read"):
+        list(frontier.frontier(several, "100", "6", jobs=1, motions=mine, errors="missing.toml"))
+
+
 def test_a_motion_that_is_not_known_is_refused():
     with pytest.raises(InputError, match="'conin' is not known"):
         list(frontier.frontier(candidates(["rk4:2"]), jobs=1, motions={"conin": ("conin", {})}))

@@ -262,8 +262,8 @@ def test_a_recording_has_the_drift_of_the_vibration_that_it_is_of(tmp_path):
     step = causes.step_length(choice, brief.gyro)
     # What is recorded has passed the gyro: 1/|G|^2 of the vibration's coning.
     line = brief.environment.lines()[0]
-    ratio = line.frequency_hz / float(brief.gyro.bandwidth_hz)
-    gain = 1 / ((1 - ratio**2) ** 2 + (2 * float(brief.gyro.damping) * ratio) ** 2)
+    ratio = line.frequency_hz / float(brief.gyro.response.frequency_hz)
+    gain = 1 / ((1 - ratio**2) ** 2 + (2 * float(brief.gyro.response.damping) * ratio) ** 2)
     assert recorded.error(expected, step) == pytest.approx(
         gain * brief.environment.error(expected, step), rel=0.02
     )

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from strapgen.catalogue.methods import rate_fit
-from strapgen.catalogue.methods.window import GyroResponse
+from strapgen.catalogue.methods.sensor_response import Response
 from strapgen.catalogue.methods.windows import WINDOWS, with_exact_rotation
 from strapgen.design.commit_late.late_filters import (
     NEXT,
@@ -112,7 +112,9 @@ def test_the_sample_itself_is_not_used_and_the_filter_is_symmetric():
 
 @pytest.mark.long
 @pytest.mark.parametrize("which", ["lost", "merged"])
-@pytest.mark.parametrize("gyro", [None, GyroResponse(Fraction(10), Fraction(7, 10), Fraction(100))])
+@pytest.mark.parametrize(
+    "gyro", [None, Response(frequency_hz=Fraction(10), damping=Fraction(7, 10), sample_hz=Fraction(100))]
+)
 def test_no_filter_near_it_has_a_smaller_sum_of_squares(which, gyro):
     window = replace(WINDOW, gyro=gyro)
     taps = np.array([float(tap) for tap in getattr(restoration(window), which)])
@@ -140,5 +142,7 @@ def test_no_filter_near_it_has_a_smaller_sum_of_squares(which, gyro):
 
 @pytest.mark.long
 def test_the_gyro_counts():
-    slow = replace(WINDOW, gyro=GyroResponse(Fraction(5), Fraction(7, 10), Fraction(100)))
+    slow = replace(
+        WINDOW, gyro=Response(frequency_hz=Fraction(5), damping=Fraction(7, 10), sample_hz=Fraction(100))
+    )
     assert restoration(slow) != restoration(WINDOW)

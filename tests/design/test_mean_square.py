@@ -9,14 +9,14 @@ import pytest
 from scipy.special import spherical_jn
 
 from strapgen.catalogue.methods import window_conditions
-from strapgen.catalogue.methods.window import GyroResponse
+from strapgen.catalogue.methods.sensor_response import Response
 from strapgen.design.filters import mean_square
 from strapgen.design.filters.band_grid import ONE, REAL, integer, magnitude, mean_grid
 from strapgen.design.filters.filter_taps import Shape
 from strapgen.ir.exceptions import InputError
 
 BAND = Fraction(13, 10)
-GYRO = GyroResponse(Fraction(40), Fraction(7071, 10000), Fraction(100))
+GYRO = Response(frequency_hz=Fraction(40), damping=Fraction(7071, 10000), sample_hz=Fraction(100))
 
 
 def columns(shape: Shape, m: int, band: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -25,7 +25,7 @@ def columns(shape: Shape, m: int, band: float) -> tuple[np.ndarray, np.ndarray, 
     j = np.arange(-shape.previous, shape.ahead + 1)
     gyro = np.ones_like(b, dtype=complex)
     if shape.gyro is not None:
-        x = 1j * b * float(shape.gyro.sample_hz) / (2 * np.pi * float(shape.gyro.bandwidth_hz))
+        x = 1j * b * float(shape.gyro.sample_hz) / (2 * np.pi * float(shape.gyro.frequency_hz))
         gyro = 1 / (1 + 2 * float(shape.gyro.damping) * x + x**2)
     A = (gyro * np.sinc(b / 2 / np.pi))[:, None] * np.exp(1j * b[:, None] * (j + 0.5))
     C = (2 * m + 1) * 1j**m * spherical_jn(m, b / 2) * np.exp(0.5j * b)
@@ -105,7 +105,10 @@ def test_the_level_is_near_that_of_the_exchange():
 
 @pytest.mark.long
 def test_a_gyro_is_taken_out():
-    gyro, band = GyroResponse(Fraction(40), Fraction(7071, 10000), Fraction(100)), Fraction(19, 10)
+    gyro, band = (
+        Response(frequency_hz=Fraction(40), damping=Fraction(7071, 10000), sample_hz=Fraction(100)),
+        Fraction(19, 10),
+    )
     shape = Shape(7, 7, 2, gyro)
     taps = mean_square.lawson_filters(shape, [0, 1], band)
     assert [level(shape, m, band, row) < 1e-4 for m, row in enumerate(taps)] == [True, True]

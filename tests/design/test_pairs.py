@@ -12,7 +12,8 @@ from scipy.spatial.transform import Rotation
 import strapgen
 from strapgen import CommitLate, choose, derive, lower, recording_attitudes
 from strapgen.catalogue.methods import windows
-from strapgen.catalogue.methods.window import GyroResponse, Window
+from strapgen.catalogue.methods.sensor_response import Response
+from strapgen.catalogue.methods.window import Window
 from strapgen.catalogue.methods.windows import WINDOWS
 from strapgen.design import family
 from strapgen.design.commit_late.commit_late_sources import sources
@@ -228,7 +229,10 @@ def test_a_file_that_is_no_pair_is_refused(changed, message, tmp_path):
         ({"taps": (1, 2)}, "u-taps is 1; a whole number at least 2 is needed"),
         ({"taps": (3, 0)}, "v-taps is 0; a whole number at least 1 is needed"),
         ({"previous": 3}, "a pair of 3 and 2 taps has 2 samples on each side of its step"),
-        ({"gyro": GyroResponse(Fraction(40), Fraction(1), Fraction(100))}, "a pair goes with no gyro"),
+        (
+            {"gyro": Response(frequency_hz=Fraction(40), damping=Fraction(1), sample_hz=Fraction(100))},
+            "a pair goes with no gyro",
+        ),
     ],
 )
 def test_what_is_no_pair_is_refused(change, message):

@@ -11,14 +11,14 @@ import pytest
 from scipy.special import spherical_jn
 
 from strapgen.catalogue.methods import rate_fit, windows
-from strapgen.catalogue.methods.window import GyroResponse
+from strapgen.catalogue.methods.sensor_response import Response
 from strapgen.catalogue.methods.windows import WINDOWS
 from strapgen.design.filters import responses
 from strapgen.design.filters.band_grid import ONE, REAL, BandGrid
 from strapgen.design.filters.filter_taps import Shape, Unknowns, in_words, rounded
 from strapgen.ir.exceptions import InputError
 
-GYRO = GyroResponse(Fraction(40), Fraction(7071, 10000), Fraction(100))
+GYRO = Response(frequency_hz=Fraction(40), damping=Fraction(7071, 10000), sample_hz=Fraction(100))
 
 
 def answers(window, b):
@@ -26,7 +26,7 @@ def answers(window, b):
     j = np.arange(window.total_increments) - window.previous
     gyro = np.ones_like(b, dtype=complex)
     if window.gyro is not None:
-        x = 1j * b * float(window.gyro.sample_hz) / (2 * np.pi * float(window.gyro.bandwidth_hz))
+        x = 1j * b * float(window.gyro.sample_hz) / (2 * np.pi * float(window.gyro.frequency_hz))
         gyro = 1 / (1 + 2 * float(window.gyro.damping) * x + x**2)
     return (gyro * np.sinc(b / 2 / np.pi))[:, None] * np.exp(1j * b[:, None] * (j + 0.5))
 

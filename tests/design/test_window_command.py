@@ -14,7 +14,7 @@ import pytest
 
 import strapgen
 from strapgen.catalogue.methods import windows
-from strapgen.catalogue.methods.window import GyroResponse
+from strapgen.catalogue.methods.sensor_response import Response
 from strapgen.catalogue.methods.windows import WINDOWS
 from strapgen.cli import main
 from strapgen.design import window_command
@@ -74,10 +74,13 @@ def test_the_file_goes_to_the_terminal_and_warnings_do_not(run, tmp_path):
     )
 
 
+OLD_GYRO = "--gyro-bandwidth-hz 40 --gyro-damping 0.7071"
+
+
 def test_options_reach_the_file(run):
     command = (
         "window design --previous 3 --ahead 2 --powers 2 --coefficients 2 --band-hz 20 --sample-hz 100 "
-        "--gyro-bandwidth-hz 40 --gyro-damping 0.7071 --noise 1e-4 --now-noise 1e-3 --rotation exact --series-terms 20"
+        f"{OLD_GYRO} --noise 1e-4 --now-noise 1e-3 --rotation exact --series-terms 20"
     )
     status, said, warned = run(f"{command} --out w.toml")
     assert status == 0 and said == ""
@@ -85,16 +88,23 @@ def test_options_reach_the_file(run):
     assert (window.previous, window.ahead, window.conditions, window.degree) == (3, 2, 2, 2)
     # 2 pi 20/100, rounded to 1e-6.
     assert window.band == Fraction("1.256637")
-    assert window.gyro == GyroResponse(Fraction(40), Fraction("0.7071"), Fraction(100))
+    assert window.gyro == Response(
+        frequency_hz=Fraction(40), damping=Fraction("0.7071"), sample_hz=Fraction(100)
+    )
     assert (window.noise, window.one_sided[0].noise) == (Fraction(1, 10**4), Fraction(1, 10**3))
     assert (window.rotation, window.terms, window.objective) == ("exact", 20, "mean square")
     assert "wrote w.toml" in warned
+    assert "--gyro-bandwidth-hz and --gyro-damping are now --response second-order:40:0.7071" in warned
+    response = "--response second-order:40:0.7071"
+    status, _, warned = run(f"{command.replace(OLD_GYRO, response)} --out again.toml")
+    assert status == 0 and "are now" not in warned
+    assert windows.read("again.toml").filters == window.filters
 
 
 @pytest.mark.long
 def test_amplifying_window_is_reported(run):
     command = "window design --previous 6 --ahead 0 --band 1.9 --powers 2 --coefficients 1 --noise 1e-9"
-    gyro = "--gyro-bandwidth-hz 40 --gyro-damping 0.7071 --sample-hz 100 --now-noise 1e-9"
+    gyro = "--response second-order:40:0.7071 --sample-hz 100 --now-noise 1e-9"
     status, _, warned = run(f"{command} {gyro} --out w.toml")
     assert status == 0
     assert (
@@ -153,7 +163,7 @@ def test_a_spectrum_shapes_the_filters(run, tmp_path):
         ("--previous 2 --ahead 2 --band 0", "--band is 0; a number above 0 is needed"),
         (
             "--previous 2 --ahead 2 --band 1 --sample-hz 100",
-            "--sample-hz needs --band-hz, --gyro-bandwidth-hz or --spectrum",
+            "--sample-hz needs --band-hz, --response, --gyro-bandwidth-hz or --spectrum",
         ),
         ("--previous 2 --ahead 2 --band 1 --gyro-bandwidth-hz 4", "--gyro-bandwidth-hz needs --gyro-damping"),
         ("--previous 2 --ahead 2 --band 1 --gyro-damping 0.7", "--gyro-damping needs --gyro-bandwidth-hz"),
@@ -309,7 +319,7 @@ def test_filters_for_a_gyro_are_refused_at_another_rate(run, tmp_path):
         name="slow-gyro",
         title="Slow gyro",
         conditions=1,
-        gyro=GyroResponse(Fraction(40), Fraction(7, 10), Fraction(100)),
+        gyro=Response(frequency_hz=Fraction(40), damping=Fraction(7, 10), sample_hz=Fraction(100)),
     )
     one_sided = tuple(replace(one, conditions=1, gyro=family.gyro) for one in family.one_sided)
     family = replace(family, one_sided=one_sided)

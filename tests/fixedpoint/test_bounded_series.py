@@ -18,10 +18,10 @@ from strapgen.fixedpoint import bounded_series
 from strapgen.fixedpoint.bounded_series import SHARE, with_declared_ranges
 from strapgen.fixedpoint.floating import rounding_bounds
 from strapgen.fixedpoint.floating.errors import NUMBERS
-from strapgen.fixedpoint.quantization import lowered
+from strapgen.fixedpoint.quantization import finished, planned
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.fixed_settings import Settings
-from strapgen.ir.program import OPERATIONS, Constant, Node, Operation, Program
+from strapgen.ir.program import OPERATIONS, Assignment, Constant, Node, Operation, Program, Reference
 from strapgen.run.backends import BACKENDS
 
 #: Largest increments in rad: that of a slow rate, of 400 deg/s in two samples of 5 ms, the default, and a large one.
@@ -201,6 +201,17 @@ def test_series_need_a_declared_range_of_all_inputs_and_a_small_argument():
     assert 0 < abs(closed - series) <= made.body[-1].remainder
 
 
+def test_a_range_that_holds_of_proper_states_alone_allows_no_series():
+    """The length of a state is near 1 of proper ones, and may be zero in the box that is declared."""
+    normalize = pipeline.program(catalogue.choose("euler-normalize"))
+    square = node("multiply", "inverse_norm", "inverse_norm")
+    cosine = Assignment("c", node("cos", node("multiply", Fraction(1, 8), node("sqrt", square))))
+    output = replace(normalize.outputs[0], nodes=(Reference("c"),) * 4)
+    code = replace(normalize, body=(*normalize.body, cosine), outputs=(output,))
+    made = with_declared_ranges(code, Settings(ranges={"state": Fraction(17, 16)}))
+    assert made.operations["function"] == 1 and not any(a.remainder for a in made.body)
+
+
 def test_functions_inside_other_operations_have_values_of_their_own():
     square = node("multiply", "x", "x")
     inside = node("add", node("multiply", "x", node("sinc", node("sqrt", square))), node("sqrt", square))
@@ -299,7 +310,7 @@ def test_fixed_point_normalizes_by_a_series_where_that_costs_no_error(rng):
     made = strapgen.quantize(step, settings)
     assert not made.operations.get("sqrt") and not made.operations.get("divide")
     assert made.program == step  # the contract is that of the closed form
-    assert made.error_bounds["next"] < lowered(step, settings).error_bounds["next"]
+    assert made.error_bounds["next"] < finished(planned(step, settings)).error_bounds["next"]
     model = strapgen.build(strapgen.generate(made, "fixed-model"))
     increments = model.representable(rng.choice([-0.01, 0.01], (8, 3, 3)) * 0.999)
     state = np.array([0.5, -0.5, 0.5, 0.5])

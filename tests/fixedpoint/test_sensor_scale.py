@@ -13,10 +13,10 @@ from fixed_inputs import corners_and_random
 import strapgen
 from strapgen import generate
 from strapgen.catalogue import Choice
-from strapgen.fixedpoint.sensor_scale import _note, in_counts
+from strapgen.fixedpoint.sensor_scale import _STAND_IN, _cost, _Multiplications, _note, _Scaling, in_counts
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.fixed_settings import Settings
-from strapgen.ir.program import Assignment, Reference
+from strapgen.ir.program import Assignment, Constant, Operation, Reference, references
 from strapgen.ir.units import Sensor
 from strapgen.navigation.two_speed import two_speed_sources
 from strapgen.run.compiled_code import CEvaluator, ModelEvaluator
@@ -104,6 +104,36 @@ def test_a_program_in_counts_is_the_same_function_for_few_multiplications(choice
     fixed = [strapgen.quantize(original, Settings.of(**lsb)) for lsb in ({}, {"lsb": "3e-6rad"})]
     few, many = (one.operations["multiply"] for one in fixed)
     assert many <= few + more
+
+
+@pytest.mark.parametrize("kernel", ["euler", "dcm"])
+def test_multiplications_are_counted_without_writing_them(kernel, rng):
+    body = program(Choice(kernel, "rk4", 3)).body
+    found = set()
+    for _ in range(20):
+        weights = {name: int(rng.integers(-2, 4)) for a in body for name in (a.name, *references(a.value))}
+        counting, writing = _Multiplications(weights), _Scaling(weights, _STAND_IN)
+        numbers = [counting.number(assignment) for assignment in body]
+        assert numbers == [_cost(writing.assigned(assignment)) for assignment in body]
+        found |= {*numbers}
+    assert len(found) > 3
+
+
+@pytest.mark.parametrize(
+    ("value", "counted"),
+    [
+        (Operation("multiply", (Reference("a"), Constant(Fraction(3)))), 1),
+        (Operation("multiply", (Reference("a"), Constant(1 / _STAND_IN))), 0),
+        (Operation("multiply", (Reference("b"), Constant(_STAND_IN**2 / 4))), 0),
+        (Operation("multiply", (Reference("a"), Constant(Fraction(0)))), 0),
+        (Operation("sqrt", (Operation("multiply", (Reference("a"), Constant(Fraction(-8)))),)), 1),
+        (Operation("multiply", (Operation("sqrt", (Constant(Fraction(2)),)), Reference("a"))), 2),
+    ],
+)
+def test_shifts_are_no_multiplications(value, counted):
+    weights, assignment = {"a": 1, "b": -2}, Assignment("y", value)
+    assert _Multiplications(weights).number(assignment) == counted
+    assert _cost(_Scaling(weights, _STAND_IN).assigned(assignment)) == counted
 
 
 def test_a_count_of_a_power_of_two_leaves_the_program_alone():

@@ -31,8 +31,7 @@ anisoinertia_s = { yz = 1e-4 }
 noise_deg_sqrt_h = 0.6
 random_walk_deg_h_sqrt_h = 6
 pulse_arcsec = 3
-bandwidth_hz = [80, 80, 60]
-damping = 0.6
+response = ["second-order:80:0.6", "second-order:80:0.6", "second-order:60:0.6"]
 delay_s = 0.001
 
 [accelerometer]
@@ -85,7 +84,7 @@ def test_every_key_is_read_in_its_unit(tmp_path):
     assert gyro.random_walk[0] * np.sqrt(3600) == pytest.approx(6 * DEG_H)
     assert force.random_walk[0] * np.sqrt(3600) == pytest.approx(60 * STANDARD_GRAVITY * 1e-6)
     np.testing.assert_allclose(gyro.pulse, 3 * DEG_H)
-    np.testing.assert_allclose(gyro.bandwidth_hz, [80, 80, 60])
+    assert [one.frequency_hz for one in gyro.response] == [80, 80, 60]
     np.testing.assert_allclose(force.bias, 100e-6 * STANDARD_GRAVITY)
     np.testing.assert_allclose(force.noise, 20e-6 * STANDARD_GRAVITY)
     np.testing.assert_allclose(force.pulse, 0.01)

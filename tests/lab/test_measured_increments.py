@@ -12,6 +12,7 @@ from tolerances import roundoff
 import strapgen
 from strapgen import choose
 from strapgen.analysis.vibration import of, through_gyro, through_gyros
+from strapgen.catalogue.methods.sensor_response import Response, parse
 from strapgen.lab.motions.motions import IntegratedMotion
 from strapgen.lab.motions.rate_profiles import CosineSum, ReferenceAttitude
 from strapgen.lab.recordings.recording import InertialRecording, Recording
@@ -26,7 +27,7 @@ from strapgen.lab.sensor_errors.instruments import (
     WarmUp,
 )
 from strapgen.lab.sensor_errors.measured_motions import measured, measured_recording
-from strapgen.lab.sensor_errors.sensors import MeasurementUnit, bounded_noise, second_order
+from strapgen.lab.sensor_errors.sensors import MeasurementUnit, bounded_noise, filtered
 from strapgen.run.backends import evaluator
 
 CONING = {"a_deg_s": 10, "b_deg_s": 10, "g_deg_s": 10}
@@ -44,7 +45,7 @@ EVERY = InstrumentErrors(
         noise=np.full(3, 1e-4),
         random_walk=np.full(3, 1e-4),
         pulse=np.full(3, 1e-5),
-        bandwidth_hz=np.full(3, 20.0),
+        response=parse("gyro", "butterworth:3:20+decimation:2+fir:1/2:1/4:1/4"),
         delay=np.full(3, 0.013),
     ),
     sampling=Sampling(1e-3, 0.05, "late"),
@@ -252,7 +253,7 @@ def test_jitter_moves_the_angle_by_rate_times_time():
 
 def test_a_gyro_of_limited_bandwidth_has_the_gain_and_the_phase_of_second_order():
     hertz, damping, interval = 80.0, 0.7, 1e-4
-    recursion = second_order(hertz, damping, interval)
+    recursion = filtered(parse("gyro", f"second-order:{hertz}:{damping}"), interval)
     for frequency in (10.0, 80.0, 200.0):
         turn = 2 * np.pi * frequency
         time = np.arange(20_001) * interval
@@ -422,9 +423,9 @@ def test_unequal_loops_measure_false_coning():
     plain = of(choose("euler", "rk4", 2))
     step = Fraction(1, 1000)
     for frequencies in ((80.0, 60.0), (60.0, 80.0), (80.0, 80.0)):
-        gyro = TriadErrors(bandwidth_hz=np.array([*frequencies, np.inf]), damping=np.full(3, damping))
+        x, y = (parse("gyro", f"second-order:{frequency}:{damping}") for frequency in frequencies)
+        gyro = TriadErrors(response=(x, y, Response()))
         rate = false_rate(motion, InstrumentErrors(gyro=gyro), step, 2)[2]
-        x, y = ((frequency, damping) for frequency in frequencies)
         rates = through_gyros(plain, x, y).rates(20, step, **wave)
         assert rates.continuous == 0
         # A staircase of the rate with 2000 stairs a second leaves (turn T)^2/12 = 0.03 %.
@@ -450,5 +451,36 @@ def test_unequal_delays_measure_false_coning():
 
 def test_equal_gyros_are_those_of_one_number():
     plain = of(choose("euler", "rk4", 2))
-    one, two = through_gyro(plain, 80, "0.7"), through_gyros(plain, (80, "0.7"), (80, "0.7"))
-    assert one.computed == two.computed
+    with pytest.warns(DeprecationWarning, match="bandwidth_hz and damping is now a response"):
+        one, two = through_gyro(plain, 80, "0.7"), through_gyros(plain, (80, "0.7"), (80, "0.7"))
+    assert one.computed == two.computed == through_gyro(plain, "second-order:80:0.7").computed
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        "butterworth:4:80",
+        "bessel:5:60+decimation:2",
+        "fir:0.5:0.3:0.2",
+        "second-order:90:0.6+instants",
+        "aa.csv",
+    ],
+)
+def test_a_response_has_its_gain_at_a_high_sampling_rate(tmp_path, words):
+    interval = 1e-3
+    hertz = np.arange(0.0, 501.0, 5.0)
+    size = np.abs(parse("gyro", "butterworth:2:120").gain(hertz))
+    lines = [f"{f},{m},{0.008}" for f, m in zip(hertz, size, strict=True)]
+    (tmp_path / "aa.csv").write_text("\n".join(["frequency_hz,magnitude,delay_s", *lines]) + "\n")
+    response = parse("gyro", words, tmp_path)
+    errors = InstrumentErrors(gyro=TriadErrors(response=response))
+    for frequency in (4.0, 21.0):
+        turn, time = 2 * np.pi * frequency, np.arange(8001) * interval
+        put_in = np.diff(np.sin(turn * time))[:, None] * THREE
+        unit = MeasurementUnit(errors, interval)
+        seen = np.concatenate([unit(part)[0] for part in np.split(put_in, [700, 701, 3000])])[3000:]
+        wave = np.exp(-1j * turn * time[3001:])
+        gain = (seen[:, 1] @ wave) / (put_in[3000:, 1] @ wave)
+        expected = response.at(Fraction(1000)).gain(frequency)
+        # The rate is a staircase, whose error is (turn interval)^2/12, and that of a delay or an instant as large.
+        assert abs(gain - expected) < (turn * interval) ** 2, frequency

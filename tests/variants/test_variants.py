@@ -189,6 +189,20 @@ def test_unknown_variant_or_command_without_options_is_refused(folder, capsys, c
     assert said in capsys.readouterr().err
 
 
+def test_the_order_of_sums_goes_to_targets_in_floating_point(folder, capsys):
+    text = TEXT.replace("word = [16, 32]", 'sums = "tree"').replace(
+        '["c-fixed", "numpy"]', '["c-fixed", "c"]'
+    )
+    (folder / "strapgen.toml").write_text(text)
+    assert words_of("attitude", "generate", ["--target", "c"])["sums"] == "tree"
+    assert "sums" not in words_of("attitude", "generate", ["--target", "c-fixed"])
+    assert "sums" not in words_of("attitude", "evidence", [])
+    run(["build"])
+    assert "--sums tree" in (folder / "firmware/euler_rk4_2.c").read_text()
+    assert "--sums" not in (folder / "firmware/euler_rk4_2_w32.c").read_text()
+    run(["build", "--check"])
+
+
 def test_no_file_is_refused(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     with pytest.raises(InputError, match="strapgen init writes one"):

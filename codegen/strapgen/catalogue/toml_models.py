@@ -45,6 +45,7 @@ from strapgen.catalogue import coefficients
 from strapgen.ir import checks
 from strapgen.ir.checks import alternatives, counted, unknown
 from strapgen.ir.exceptions import InputError
+from strapgen.ir.renamed import warn
 from strapgen.storage import streams
 
 #: Fractions take no time to read, and those of filters for a gyro are long.
@@ -359,6 +360,10 @@ class _Table(_Form):
 
     def _read(self, where: str, value: Any) -> Any:
         start = f"{where}." if where else ""
+        for old, new in getattr(self.model, "OLD_KEYS", {}).items():
+            if old in value and new not in value:
+                warn(f"{start}{old}", f"{start}{new}")
+                value = {new if name == old else name: entry for name, entry in value.items()}
         for name in value:
             if name not in self.keys:
                 raise InputError(f"{where}{': ' if where else ''}{unknown('key', name, self.keys)}")

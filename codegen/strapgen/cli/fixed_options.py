@@ -151,6 +151,16 @@ class FixedOptions:
             "[default: all]",
         ),
     ] = None
+    sums: Annotated[
+        _Text,
+        option(
+            "--sums",
+            metavar="NAME",
+            help="Order of the sums of targets in floating point: canonical, or tree for balanced trees.  "
+            "[default: canonical]",
+            read=names("strapgen.ir.fixed_settings:SUMS"),
+        ),
+    ] = None
     state: Annotated[
         _Text,
         option(
@@ -189,6 +199,8 @@ class FixedOptions:
     def settings(self, increments: int) -> Settings | None:
         """Return the settings of fixed point for so many increments a step; None if no option is stated."""
         given = {part.name: value for part in fields(self) if (value := getattr(self, part.name)) is not None}
+        if given.get("sums") == "canonical":  # no target takes anything else unless it is told
+            del given["sums"]
         if not given:
             return None
         from strapgen.ir.fixed_settings import Settings
@@ -198,10 +210,10 @@ class FixedOptions:
         return Settings.of(increments=increments, **given)
 
     def check_target(self, target: str) -> None:
-        """Refuse options that a target in floating point does not take: all but those of the largest numbers."""
+        """Refuse options that a target does not take: in floating point all but the largest numbers and --sums."""
         from strapgen.targets import TARGETS, fixed_targets
 
-        if not TARGETS[target].fixed and not {*stated(self)} <= _RANGE_OPTIONS:
+        if not TARGETS[target].fixed and not {*stated(self)} <= {*_RANGE_OPTIONS, "--sums"}:
             takers = " or ".join(fixed_targets())
             raise InputError(f"the options of fixed point go with --target {takers}, not with {target}")
 

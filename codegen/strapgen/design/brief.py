@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from fractions import Fraction
 from pathlib import Path
 from typing import Annotated, Any, Protocol
@@ -17,8 +17,10 @@ from numpy.typing import NDArray
 
 from strapgen.analysis.vibration.mean_rates import Assessment
 from strapgen.analysis.vibration.spectrum import Spectrum, random_rates, read_spectrum
+from strapgen.catalogue.methods.sensor_response import INPUTS, Response, files_in, parse
 from strapgen.catalogue.toml_models import Key, UserFile
 from strapgen.ir.exceptions import InputError
+from strapgen.ir.renamed import warn
 from strapgen.lab.processors import PROCESSORS
 from strapgen.lab.recordings.recording import read_increments
 from strapgen.targets.registry import TARGETS
@@ -237,23 +239,57 @@ class GyroBrief:
     pulse_arcsec: Annotated[
         Fraction, Key("Angle of a pulse; 0 for increments that are not quantized", "arcsec", least=0)
     ] = Fraction(0)
-    #: Both are None for a gyro that passes on everything
+    #: Both are old names of a response of second order
     bandwidth_hz: Annotated[
-        Fraction | None, Key("Natural frequency of a gyro of second order", "Hz", above=0)
+        Fraction | None, Key("Old: natural frequency of a response of second order", "Hz", above=0)
     ] = None
-    damping: Annotated[Fraction | None, Key("Its damping ratio", "1", above=0)] = None
+    damping: Annotated[Fraction | None, Key("Old: its damping ratio", "1", above=0)] = None
+    #: A text has become a response once the brief is read
+    response: Annotated[
+        str | Response | None,
+        Key("Response: a table, or as --response, a CSV file by its path from the brief's folder"),
+    ] = None
+    delay_s: Annotated[Fraction | None, Key("Delay", "s", least=0, most=10)] = None
+    input: Annotated[
+        str | None,
+        Key("A sample is the integral over its interval, or the rate as that begins", choices=INPUTS),
+    ] = None
 
     def __post_init__(self) -> None:
         if (self.bandwidth_hz is None) != (self.damping is None):
             missing = "damping" if self.damping is None else "bandwidth_hz"
             raise InputError(f"{missing} is missing; bandwidth_hz and damping go together")
 
+        if self.bandwidth_hz is not None and self.response is not None:
+            raise InputError("bandwidth_hz and response are both there; response is needed")
+
+    def read(self, folder: Path) -> GyroBrief:
+        """Return the gyro with the response that it states, whose file is in a folder."""
+        own: Any = self.response or Response()
+        if self.bandwidth_hz is not None:
+            warn("gyro.bandwidth_hz", "gyro.response")
+            own = Response(frequency_hz=self.bandwidth_hz, damping=self.damping)
+        if isinstance(own, str):
+            own = parse("gyro.response", own, folder)
+        beside = {"delay_s": self.delay_s, "input": self.input}
+        own = replace(own, **{key: value for key, value in beside.items() if value is not None})
+        return replace(self, bandwidth_hz=None, damping=None, response=own.at(self.sample_hz))
+
+    @property
+    def seen(self) -> Response | None:
+        """The response once the brief is read; None for a gyro whose samples are integrals of the rate."""
+        return self.response if isinstance(self.response, Response) and self.response.changes else None
+
+    def noise_ratio(self, rate_deg_s: Fraction) -> Fraction:
+        """Return the standard deviation of an increment's noise and pulses by that of a rate."""
+        # A random walk of N deg in a root of an hour is N / 60 in a root of a second.
+        walk = self.noise_deg_sqrt_h / 60 / math.sqrt(self.sample_hz)
+        size = math.hypot(walk, float(self.pulse_arcsec) / 3600 / math.sqrt(12))
+        return Fraction(f"{size * self.sample_hz / rate_deg_s:.3e}")
+
     def gain(self, frequency_hz: Any) -> Any:
         """Return the complex factor by which it passes on an oscillation at a frequency, or at many, in Hz."""
-        if self.bandwidth_hz is None or self.damping is None:
-            return 1.0 + 0.0 * frequency_hz
-        ratio = frequency_hz / float(self.bandwidth_hz)
-        return 1 / (1 - ratio**2 + 2j * float(self.damping) * ratio)
+        return (self.seen or Response()).gain(frequency_hz)
 
 
 @dataclass(frozen=True)
@@ -358,13 +394,15 @@ def read_brief(path: str | Path) -> DesignBrief:
 
     def brief(file: BriefFile) -> DesignBrief:
         environment = file.vibration.environment(Path(path).parent)
-        return DesignBrief(file.max_rate_deg_s, environment, file.gyro, file.budget, file.processor)
+        gyro = file.gyro.read(Path(path).parent)
+        return DesignBrief(file.max_rate_deg_s, environment, gyro, file.budget, file.processor)
 
     return BRIEF.convert(path, brief)
 
 
 def files_of(path: str | Path) -> list[Path]:
-    """Return the files of a brief: its own, and that of its vibration."""
-    vibration = BRIEF.read(path).vibration
-    named = [name for name in (vibration.psd, vibration.recording) if name is not None]
+    """Return the files of a brief: its own, that of its vibration, and that of its gyro's response."""
+    file = BRIEF.read(path)
+    named = [name for name in (file.vibration.psd, file.vibration.recording) if name is not None]
+    named += files_in(file.gyro.response) if isinstance(file.gyro.response, str) else []
     return [Path(path), *(Path(path).parent / name for name in named)]

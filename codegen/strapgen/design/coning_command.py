@@ -35,7 +35,7 @@ class ConingDesign(BandOptions):
     panel: ClassVar[str] = "Design"
     rules: ClassVar[tuple[Rule, ...]] = (
         Needs(
-            "--band --band-hz --sample-hz --gyro-bandwidth-hz --gyro-damping --spectrum --powers --products "
+            "--band --band-hz --sample-hz --response --gyro-bandwidth-hz --gyro-damping --spectrum --powers --products "
             "--noise-rad --pulse-rad --name",
             "--objective=band|worst|random",
         ),

@@ -21,9 +21,9 @@ from strapgen.analysis.vibration.spectrum import Spectrum
 from strapgen.catalogue.methods import coning_drift
 from strapgen.catalogue.methods.coefficient_files import slug
 from strapgen.catalogue.methods.coning_drift import ConingShape
+from strapgen.catalogue.methods.sensor_response import Response
 from strapgen.catalogue.methods.shaped_coning import ShapedConing
-from strapgen.catalogue.methods.window import GyroResponse
-from strapgen.design.family import number
+from strapgen.design.family import gyro_lines, number
 from strapgen.design.filters import exchange
 from strapgen.design.filters.band_grid import BITS, REAL, integer
 from strapgen.design.filters.exchange import Responses
@@ -58,7 +58,7 @@ class ConingBrief:
     #: Number of powers of the frequency that the drift has not, from the third on
     powers: int = 0
     #: By default the increments are integrals of the rate
-    gyro: GyroResponse | None = None
+    gyro: Response | None = None
     #: Standard deviation of the noise of an increment, and the pulse of the gyro, in rad, for "random"
     noise: Fraction = Fraction(0)
     pulse: Fraction = Fraction(0)
@@ -80,7 +80,7 @@ class ConingBrief:
         if self.band is None:
             parts = [f"Coning {self.increments}+{self.previous} for a spectrum, {self.objective} phases"]
         if self.gyro is not None:
-            parts.append(f"gyro {float(self.gyro.bandwidth_hz):g} Hz")
+            parts.append(f"gyro {self.gyro.title}")
         return self.title or ", ".join(parts)
 
 
@@ -321,13 +321,12 @@ class Lines:
         """The unit of `square_weights`, in rad^4/Hz."""
         return max(self.products) ** 2 / (self.hertz[1] - self.hertz[0])
 
-    def increment_square(self, gyro: GyroResponse | None) -> float:
+    def increment_square(self, gyro: Response | None) -> float:
         """Return the mean square of an increment, both axes together, in rad^2."""
         b = 2 * np.pi * np.array(self.hertz) / float(self.sample_hz)
         power = np.ones(len(b))
         if gyro is not None:
-            x = np.array(self.hertz) / float(gyro.bandwidth_hz)
-            power = 1 / ((1 - x * x) ** 2 + (2 * float(gyro.damping) * x) ** 2)
+            power = np.abs(gyro.gain(np.array(self.hertz))) ** 2
         return float((np.array(self.squares) * power * 2 * np.sin(b / 2) ** 2).sum())
 
 
@@ -394,6 +393,5 @@ def written(shape: ShapedConing, command: str, figures: Sequence[str] = ()) -> s
     lines += [f"{key} = {json.dumps(value, ensure_ascii=False)}" for key, value in head.items()]
     lines += ["coefficients = [", *(f'  "{value}",' for value in shape.coefficients), "]"]
     if shape.gyro is not None:
-        lines += ["", "[gyro]"]
-        lines += [f'{key} = "{number(value)}"' for key, value in vars(shape.gyro).items()]
+        lines += ["", "[gyro]", *gyro_lines(shape.gyro)]
     return "\n".join(lines) + "\n"

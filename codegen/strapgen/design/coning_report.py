@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -262,7 +263,7 @@ class ShapedResult(Result):
     #: Highest degree of products of two powers of time in the rate for which a step is exact; 0 for none
     products: int
     band_rad_sample: float | None
-    gyro: dict[str, float] | None
+    gyro: dict[str, Any] | None
     coefficients: tuple[Fraction, ...]
     figures: Mapping[str, float] = field(metadata=entry(spread=True, kind=ReachedDrift))
     drift: list[DriftRow]
@@ -271,7 +272,7 @@ class ShapedResult(Result):
     def of(drift: ShapedDrift) -> ShapedResult:
         """Return coefficients with their drift."""
         shape = drift.shape
-        gyro = None if shape.gyro is None else {key: float(one) for key, one in vars(shape.gyro).items()}
+        gyro = None if shape.gyro is None else shape.gyro.plain
         same = (
             "name",
             "title",

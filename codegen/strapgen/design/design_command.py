@@ -17,7 +17,7 @@ from strapgen.cli.progress import track, waiting
 from strapgen.cli.values import Positive, whole
 from strapgen.ir.exceptions import InputError
 from strapgen.lab.motions.motion_names import is_file
-from strapgen.lab.run_options import MotionSettings, WorkerOptions, motion_option
+from strapgen.lab.run_options import MotionSettings, SensorFile, WorkerOptions, motion_option
 
 if TYPE_CHECKING:
     from strapgen.design.brief import DesignBrief
@@ -37,7 +37,7 @@ def design(
             *("--method", "--methods"),
             metavar="NAME,...",
             help="Compare these methods only, with all numbers of samples or some, as magnus4 or coning-combined:3+3.  "
-            "[default: all of the catalogue, and coefficients designed for the vibration]",
+            "[default: all of the catalogue, and what is designed for the brief]",
             panel="Algorithm",
         ),
     ] = None,
@@ -75,8 +75,8 @@ def design(
     """Select the cheapest algorithm that meets a brief.
 
     The brief states the largest rate, the vibration, the gyro, the budget and the processor. You see every algorithm
-    of the catalogue, and coefficients designed for the vibration, with its predicted drift by cause, its cost, and the
-    limit that excludes it if it does not meet the brief. The bound of rounding is certified.
+    of the catalogue, and coefficients and filters designed for the vibration and the gyro, with its predicted drift by
+    cause, its cost, and the limit that excludes it if it does not meet the brief. The bound of rounding is certified.
 
     Example: strapgen design examples/briefs/ahrs.toml --plot out/ahrs.png
 
@@ -172,6 +172,7 @@ def frontier(
     ] = None,
     motion: Annotated[str | None, motion_option("cones, random rates and slews")] = None,
     settings: MotionSettings = None,
+    errors: SensorFile = None,
     run: StudyRun,
     workers: WorkerOptions,
     output: Output,
@@ -182,7 +183,8 @@ def frontier(
     sharp onsets. You see the largest angle from the true attitude, divided by the duration, beside the multiplications
     and additions for each sample. The plot marks the algorithms that halve the drift of all cheaper ones.
 
-    With --motion the algorithms run on that motion only.
+    With --motion the algorithms run on that motion only. With --errors the samples are those of sensors with errors,
+    and the drift is the steady one: between the means of the first and the last tenth, of some runs.
 
     A method:N+P+L takes N samples in a step, P from before it and L from after it. The method fit-exact integrates the
     polynomial through its samples exactly, as iterations on it do in the limit.
@@ -192,7 +194,7 @@ def frontier(
     Example: strapgen frontier --method coning-least-squares,window-7-7 --duration 6 --results out/frontier.jsonl --plot
     out/frontier.png
     """
-    output.check(run.results, motion if motion and is_file(motion) else None)
+    output.check(run.results, motion if motion and is_file(motion) else None, errors)
     _check_results(run.results, output)
     from strapgen.cli.progress import track
     from strapgen.design import frontier as study
@@ -200,8 +202,10 @@ def frontier(
     motions = study.MOTIONS if motion is None else {motion: (motion, settings or {})}
     rates, cluster = (str(run.sample_hz), str(run.duration)), workers.workers()
     several = study.candidates(methods)
-    runs = study.frontier(several, *rates, run.results, workers.jobs, cluster, motions)
+    runs = study.frontier(several, *rates, run.results, workers.jobs, cluster, motions, errors or "")
     drifts_and_costs = study.in_order(track(runs, "running", len(several)), several)
     from strapgen.design.frontier import FrontierResult
 
-    output.show(FrontierResult(drifts_and_costs, float(run.sample_hz), float(run.duration), motions))
+    output.show(
+        FrontierResult(drifts_and_costs, float(run.sample_hz), float(run.duration), motions, errors or "")
+    )

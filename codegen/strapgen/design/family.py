@@ -15,7 +15,8 @@ from fractions import Fraction
 from typing import Any
 
 from strapgen.catalogue.methods.coefficient_files import slug
-from strapgen.catalogue.methods.window import GyroResponse, Taps, Window, sibling_name, sibling_title
+from strapgen.catalogue.methods.sensor_response import Response
+from strapgen.catalogue.methods.window import Taps, Window, sibling_name, sibling_title
 from strapgen.catalogue.methods.windows import of_sibling, one_sided_sizes, start_sizes, stored_sizes
 from strapgen.design.filters import exchange, mean_square, responses
 from strapgen.design.filters.filter_taps import Shape, Unknowns, rounded
@@ -44,7 +45,7 @@ class FamilyBrief:
         The filters are exact for polynomial rates of a degree below this.
     degree : int
         Highest Legendre coefficient of the rate that is estimated.
-    gyro : GyroResponse, optional
+    gyro : Response, optional
         By default the increments are integrals of the rate.
     noise, one_sided_noise, start_noise : Fraction, optional
         Standard deviation of the noise of an increment, by that of the rate times the sampling interval, for the
@@ -81,7 +82,7 @@ class FamilyBrief:
     band: Fraction
     conditions: int = 4
     degree: int = 4
-    gyro: GyroResponse | None = None
+    gyro: Response | None = None
     noise: Fraction = Fraction(0)
     one_sided_noise: Fraction = ONE_SIDED_NOISE
     spectrum: tuple[int, ...] | None = None
@@ -137,7 +138,7 @@ class FamilyBrief:
             kind = f"Pair {samples} of {self.taps[0]}/{self.taps[1]} taps"
         parts = [f"{kind} to {float(self.band):g} rad"]
         if self.gyro is not None:
-            parts.append(f"gyro {float(self.gyro.bandwidth_hz):g} Hz")
+            parts.append(f"gyro {self.gyro.title}")
         if self.noise:
             parts.append(f"noise {float(self.noise):g}")
         if self.spectrum is not None:
@@ -184,24 +185,13 @@ def design(
     >>> [one.name for one in window.one_sided]
     ['window-1-2-2-to-1-rad-3-1', 'window-1-2-2-to-1-rad-4-0', 'window-1-2-2-to-1-rad-0-4', 'window-1-2-2-to-1-rad-1-3']
     """
-    designed = {size: _filters(brief, size, brief.one_sided_noise) for size in track(brief.sizes)}
-    committed = Window(
-        slug(brief.full_title),
-        brief.full_title,
-        _source(brief),
-        brief.increments,
-        brief.previous,
-        brief.ahead,
-        brief.conditions,
-        brief.band,
-        brief.objective,
-        designed[brief.previous, brief.ahead],
-        brief.gyro,
-        brief.noise,
-        brief.rotation,
-        brief.terms,
-        form="legendre" if brief.taps is None else "pair",
-    )
+    committed, designed = None, {}
+    for size in track(brief.sizes):
+        if committed is None:
+            committed = commit_filters(brief)
+        else:
+            designed[size] = _filters(brief, size, brief.one_sided_noise)
+    assert committed is not None, "its size is the first one"
     windows = {}
     for size in one_sided_sizes(brief.previous, brief.ahead):
         if size in designed:
@@ -213,6 +203,31 @@ def design(
         for size in start_sizes(brief.previous, brief.ahead)
     )
     return replace(committed, one_sided=tuple(windows.values()), start=start)
+
+
+def commit_filters(brief: FamilyBrief) -> Window:
+    """Return the filters that commit an attitude alone, as `design` does.
+
+    >>> commit_filters(FamilyBrief(2, 2, Fraction(1), degree=2)).one_sided
+    ()
+    """
+    return Window(
+        slug(brief.full_title),
+        brief.full_title,
+        _source(brief),
+        brief.increments,
+        brief.previous,
+        brief.ahead,
+        brief.conditions,
+        brief.band,
+        brief.objective,
+        _filters(brief, (brief.previous, brief.ahead), brief.one_sided_noise),
+        brief.gyro,
+        brief.noise,
+        brief.rotation,
+        brief.terms,
+        form="legendre" if brief.taps is None else "pair",
+    )
 
 
 def _source(brief: FamilyBrief) -> str:
@@ -310,8 +325,7 @@ def written(family: Window, command: str) -> str:
     ]
     lines += _filter_lines(family.filters)
     if family.gyro is not None:
-        lines += ["", "[gyro]"]
-        lines += [f'{key} = "{number(value)}"' for key, value in vars(family.gyro).items()]
+        lines += ["", "[gyro]", *gyro_lines(family.gyro)]
     sizes = stored_sizes(family.previous, family.ahead, family.gyro is None)
     tables = [("one_sided", family.one_sided_with(ahead)) for _, ahead in sizes]
     for key, one in tables + [("start", one) for one in family.start]:
@@ -320,6 +334,17 @@ def written(family: Window, command: str) -> str:
         lines += [f'band = "{number(one.band)}"'] if one.band != family.band else []
         lines += _filter_lines(one.filters)
     return "\n".join(lines) + "\n"
+
+
+def gyro_lines(gyro: Response) -> Iterator[str]:
+    """Yield the keys of a response and their values, as in a TOML file.
+
+    >>> [*gyro_lines(Response(damping=Fraction(7, 10), frequency_hz=Fraction(40), sample_hz=Fraction(100)))]
+    ['filter = "second-order"', 'frequency_hz = "40"', 'damping = "0.7"', 'sample_hz = "100"']
+    """
+    for key, value in gyro.facts.items():
+        texts = repr(value) if isinstance(value, int) else json.dumps(value, default=number)
+        yield f"{key} = {texts}"
 
 
 def _file_head(family: Window) -> dict[str, str | int]:

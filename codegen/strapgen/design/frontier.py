@@ -6,6 +6,7 @@ of the step.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from fractions import Fraction
@@ -24,10 +25,14 @@ from strapgen.lab.motions.motion_names import is_file
 from strapgen.lab.motions.motions import Motion
 from strapgen.lab.motions.users_motions import any_motion
 from strapgen.lab.parallel_cases import Bundle, Cluster, moved, resume, side_by_side
-from strapgen.lab.runs import measured_drift
+from strapgen.lab.runs import measured_drift, simulate, steady_drift
+from strapgen.lab.sensor_errors.error_file import CLASSES, ERRORS, path_of, read
+from strapgen.lab.sensor_errors.instruments import InstrumentErrors
+from strapgen.lab.sensor_errors.measured_motions import measured
 from strapgen.results.records import INTERNAL, Properties, entry, plain_record, properties, reader_table
 from strapgen.results.result import Result
 from strapgen.results.table import ANGLE, Column, TextTable
+from strapgen.run.backends import backend
 from strapgen.storage import cache as disk_cache
 
 #: Motions by their labels: a name, or a user's file, and its settings.
@@ -52,6 +57,8 @@ MOTIONS: Motions = {
     **{f"slew {ms} ms": ("slew", {"onset_s": f"0.0{ms}"}) for ms in ("50", "10")},
     "ramps 50 ms": ("ramps", {"onset_s": "0.05"}),
 }
+#: Runs of sensors with errors, each with random numbers of its own.
+_SENSOR_RUNS = 4
 #: The state that all algorithms integrate.
 STATE = "euler"
 #: What stands for the candidates of all methods.
@@ -106,10 +113,10 @@ CANDIDATES = tuple(
         "coning-least-squares": ((4,), (3, 3), (1, 8)),
         "coning-shaped-8": ((1, 8),),
         "fit-exact": ((1, 1), (2,), (3,), (4,), (3, 3)),
-        "window-3-3": ((1, 3, 3),),
-        "window-5-5": ((1, 5, 5),),
         "window-7-7": ((1, 7, 7),),
         "window-9-9": ((1, 9, 9),),
+        **{f"pair-1-{side}": ((1, side, side),) for side in (5, 7, 8, 9)},
+        **{f"pair-2-{side}": ((2, side, side),) for side in (5, 7)},
     }.items()
     for samples in several
 )
@@ -148,6 +155,8 @@ class RunSpec:
     duration: str
     #: By their labels
     motions: Motions = field(default_factory=lambda: MOTIONS)
+    #: File or class of sensor errors; empty for exact increments
+    errors: str = ""
 
     def moved(self, begin: Path, end: Path) -> RunSpec:
         """Return the specification with the user's files in another folder, see `parallel_cases.Bundle`."""
@@ -156,7 +165,8 @@ class RunSpec:
             one = replace(one, method=moved(one.method, begin, end))
         for label, (name, settings) in motions.items():
             motions[label] = (moved(name, begin, end) if is_file(name) else name, settings)
-        return replace(self, candidate=one, motions=motions)
+        errors = moved(self.errors, begin, end) if self.errors and self.errors not in CLASSES else self.errors
+        return replace(self, candidate=one, motions=motions, errors=errors)
 
 
 def candidates(names: Iterable[str] | None = None) -> list[Candidate]:
@@ -200,8 +210,8 @@ def _of_method(method: str) -> list[Candidate]:
     return [Candidate(method, choice.increments, choice.previous, choice.ahead)]
 
 
-def identity(sample_hz: str, duration: str, motions: Motions = MOTIONS) -> dict[str, Any]:
-    """Return the identity of a study: the code, the sampling, and the motions."""
+def identity(sample_hz: str, duration: str, motions: Motions = MOTIONS, errors: str = "") -> dict[str, Any]:
+    """Return the identity of a study: the code, the sampling, the motions, and the errors of sensors."""
     return {
         "study": "frontier",
         "version": VERSION,
@@ -209,6 +219,7 @@ def identity(sample_hz: str, duration: str, motions: Motions = MOTIONS) -> dict[
         "sample_hz": str(Fraction(sample_hz)),
         "duration_s": str(Fraction(duration)),
         "motions": {label: [name, dict(settings)] for label, (name, settings) in motions.items()},
+        **({"errors": repr(ERRORS.content(path_of(errors)))} if errors else {}),
     }
 
 
@@ -220,22 +231,26 @@ def frontier(
     jobs: int | None = None,
     cluster: Cluster | None = None,
     motions: Motions = MOTIONS,
+    errors: str = "",
 ) -> Iterator[DriftAndCost]:
     """Run algorithms on motions, and yield drift and cost of each when its runs end.
 
-    `sample_hz, duration`: sampling rate in Hz, and length of the runs in s.
+    `sample_hz, duration`: sampling rate in Hz, and length of the runs in s. `errors`: file or class of sensor errors.
     """
+    if errors:
+        read(errors)  # refuses what is not allowed
     rate, length = require_steps(several, sample_hz, duration)
     for name, settings in motions.values():
         any_motion(name, str(length), settings)  # refuses what is not known
-    cases = {one.name: RunSpec(one, str(rate), str(length), motions) for one in several}
+    cases = {one.name: RunSpec(one, str(rate), str(length), motions, errors) for one in several}
     users = [one.method for one in several if one.method.endswith(".py")]
     users += [name for name, _ in motions.values() if is_file(name)]
+    users += [errors] if errors and errors not in CLASSES else []
     files = None if cluster is None else Bundle.of(users)
     if results is None:
         finished = side_by_side(run_case, cases, jobs, cluster, files)
     else:
-        about = identity(str(rate), str(length), motions)
+        about = identity(str(rate), str(length), motions, errors)
         finished = resume(run_case, cases, results, about, jobs, cluster, files)
     for _, data in finished:
         yield DriftAndCost(**data)
@@ -287,10 +302,25 @@ def _drift(choice: Choice, label: str, spec: RunSpec) -> float | None:
     with np.errstate(all="ignore"):
         try:
             profile = _motion(name, tuple(settings.items()), spec.duration)
-            value = measured_drift(choice, profile, step, duration // step)
+            if spec.errors:
+                value = _drift_of_sensors(choice, profile, step, duration // step, spec.errors)
+            else:
+                value = measured_drift(choice, profile, step, duration // step)
         except InputError:  # the attitude is not finite
             return None
     return value if np.isfinite(value) else None
+
+
+def _drift_of_sensors(choice: Choice, motion: Motion, step: Fraction, count: int, errors: str) -> float:
+    """Return the root mean square of the steady drift in deg/h of runs of sensors with errors."""
+    stepper, sensors = backend(choice), _sensors(errors)
+    runs = (simulate(stepper, measured(motion, sensors, k), step, count * step) for k in range(_SENSOR_RUNS))
+    return math.sqrt(math.fsum(steady_drift(run) ** 2 for run in runs) / _SENSOR_RUNS)
+
+
+@cache
+def _sensors(errors: str) -> InstrumentErrors:
+    return read(errors)
 
 
 @cache
@@ -348,6 +378,8 @@ class FrontierResult(Result):
     #: Length of the runs
     duration_s: float
     described: Motions = field(default_factory=lambda: MOTIONS, metadata=INTERNAL)
+    #: File or class of sensor errors; empty for exact increments
+    errors: str = ""
 
     @property
     def motions(self) -> dict[str, dict[str, str]]:
@@ -390,10 +422,17 @@ class FrontierResult(Result):
 
     def text(self) -> str:
         """Return a table of costs, and one for each kind of motion."""
-        lines = [
+        exact = [
             f"largest angle from the true attitude over {self.duration_s:g} s, divided by that time, in deg/h,",
             f"with exact increments at {self.sample_hz:g} Hz; every figure is measured here,",
             "what rounding could hide again in 40 digits; random rates and slews, integrated to 5e-13 rad, cannot be",
+        ]
+        of_sensors = [
+            f"steady drift over {self.duration_s:g} s in deg/h, root mean square of {_SENSOR_RUNS} runs,",
+            f"with increments at {self.sample_hz:g} Hz of sensors with errors, {self.errors}",
+        ]
+        lines = [
+            *(of_sensors if self.errors else exact),
             "",
             "operations for each sample, counted from the program; other: divisions, roots, sines, cosines, choices",
             "N+P+L: samples of a step, from before it, from after it",

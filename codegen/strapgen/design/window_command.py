@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from pathlib import Path
@@ -282,9 +281,7 @@ def _now_noise(value: str) -> Fraction:
         raise InputError(
             f"--now-noise {value}: the gyro's noise_deg_sqrt_h is 0; a brief with noise is needed"
         )
-    # A random walk of N deg in a root of an hour is N / 60 in a root of a second.
-    increment = brief.gyro.noise_deg_sqrt_h / 60 / math.sqrt(brief.gyro.sample_hz)
-    return Fraction(f"{increment * brief.gyro.sample_hz / brief.max_rate_deg_s:.3e}")
+    return replace(brief.gyro, pulse_arcsec=Fraction(0)).noise_ratio(brief.max_rate_deg_s)
 
 
 def _title(name: str | None) -> str:

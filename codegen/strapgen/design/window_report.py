@@ -91,7 +91,7 @@ class WindowResult(Result):
     conditions: int
     #: Highest angular frequency for which they are designed
     band_rad_sample: float
-    gyro: dict[str, float] | None
+    gyro: dict[str, Any] | None
     #: "fourth" for the rotation vector to fourth order, or "exact" for a power series of the quaternion
     rotation: str
     #: "legendre" for a filter of each coefficient, or "pair" for two whose product is that of coning
@@ -112,7 +112,7 @@ class WindowResult(Result):
             window=window,
             **{name: getattr(window, name) for name in same},
             band_rad_sample=float(window.band),
-            gyro=None if gyro is None else {key: float(value) for key, value in vars(gyro).items()},
+            gyro=None if gyro is None else gyro.plain,
             terms=window.terms if window.rotation == "exact" else None,
             side=WindowSide.of(window),
             one_sided=list(map(NamedSide.of, window.one_sided)),
@@ -182,8 +182,7 @@ def _objective(window: Window) -> str:
 def _gyro(window: Window) -> str:
     if window.gyro is None:
         return "ideal: increments are integrals of the rate"
-    bandwidth, damping, sample = map(number, vars(window.gyro).values())
-    return f"second order, {bandwidth} Hz, damping {damping}, {sample} samples in a second"
+    return f"{window.gyro.words}, {number(window.gyro.sample_hz or Fraction(0))} samples in a second"
 
 
 def _side_table(result: WindowResult, first: int) -> TextTable:

@@ -61,7 +61,7 @@ def project_files(
     """Return the files that build and test the C of a kernel, without those of the kernel itself."""
     table = vectors_of_choice(choice, target, settings, naming=naming)
     sources = table.sources
-    command = f"strapgen generate {naming.of(pipeline.program(choice)).arguments} --target {target}"
+    command = f"strapgen generate {sources.info.arguments} --target {target}"
     if sources.fixed is not None:
         command += f" {options(sources.fixed.settings, sources.function.inputs)}"
     command += " --project"

@@ -105,12 +105,12 @@ def vectors_of_choice(
     checks.choice("target", target, [name for name, entry in BUILT_IN.items() if entry.compiled])
     sources = pipeline.compile(choice, target, settings, naming)
     program = pipeline.program(choice)
-    command = f"strapgen vectors {naming.of(program).arguments} --target {target}"
+    command = f"strapgen vectors {sources.info.arguments} --target {target}"
     if sources.fixed is not None:
         command += f" {options(sources.fixed.settings, program.inputs)}"
         reference = pipeline.compile(choice, MODEL, settings)
     else:
-        reference = sources_of_program(program, "exact")
+        reference = sources_of_program(pipeline.declared(program, target, settings), "exact")
     return call_vectors(sources, reference, f"{command} --count {count} --seed {seed}", count, seed)
 
 

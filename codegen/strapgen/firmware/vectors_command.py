@@ -46,12 +46,14 @@ def vectors(
     from strapgen.firmware.project import refuse_changed
     from strapgen.firmware.vectors import VectorsResult, vectors_of_choice
     from strapgen.firmware.vectors_c import table_files
+    from strapgen.ir.fixed_settings import Settings
     from strapgen.storage.files import write_files
     from strapgen.targets import BUILT_IN
 
     choice = method.choose(algorithm, step=False)
     settings = fixed.settings(choice.increments_per_step)
-    if settings is not None and target in BUILT_IN and not BUILT_IN[target].fixed:
+    is_floating = target in BUILT_IN and not BUILT_IN[target].fixed
+    if is_floating and settings is not None and settings != Settings(sums=settings.sums):
         raise InputError(f"the options of fixed point go with --target c-fixed, not with {target}")
     fixed.check_increments(choice)
     table = vectors_of_choice(choice, target, settings, count, seed)

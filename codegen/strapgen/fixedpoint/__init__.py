@@ -16,7 +16,7 @@ __all__ = ["OPERATIONS", "FixedProgram", "Format", "Interface", "Settings", "can
 def quantize(program: Program, settings: Settings) -> FixedProgram:
     """Lower a program to integers."""
     from strapgen.fixedpoint.bounded_series import without_roots
-    from strapgen.fixedpoint.quantization import lowered
+    from strapgen.fixedpoint.quantization import finished, planned
     from strapgen.fixedpoint.sensor_scale import counted, in_counts
 
     if any(signal.constraint == "covariance" for signal in program.inputs):
@@ -30,12 +30,14 @@ def quantize(program: Program, settings: Settings) -> FixedProgram:
     counts = program if settings.sensor is None else in_counts(program, settings.sensor)
     try:
         series = without_roots(counts, settings)
+        one = planned(counts, settings)
         if series is not counts:
             with suppress(InputError):  # a word is too short for it
-                one, other = (lowered(code, settings, high=False).error_bounds for code in (counts, series))
-                if all(other[name] <= error for name, error in one.items()):
-                    return replace(lowered(series, settings), program=program)
-        return replace(lowered(counts, settings), program=program)
+                other = planned(series, settings)
+                bounds = other.fixed.error_bounds
+                if all(bounds[name] <= error for name, error in one.fixed.error_bounds.items()):
+                    return replace(finished(other), program=program)
+        return replace(finished(one), program=program)
     except InputError:
         raise
     except (ValueError, ArithmeticError) as error:  # a proof fails, as where a divisor may be zero

@@ -70,24 +70,34 @@ _WORSE = Fraction(101, 100)
 _NARROWED = Fraction(61, 60)
 
 
-def lowered(program: Program, settings: Settings, high: bool = True) -> FixedProgram:
-    """Lower a program to integers; parameters and errors are those of `strapgen.fixedpoint.quantize`.
+@dataclass(frozen=True)
+class Planned:
+    """A program in integers before the search for high words, which takes most of the time."""
 
-    Without `high`, no sums are narrowed to high words, which takes most of the time to find.
-    """
+    quantities: Quantities
+    plan: FormatPlan
+    context: Quantization
+    fixed: FixedProgram
+
+
+def planned(program: Program, settings: Settings) -> Planned:
+    """Lower a program to integers; parameters and errors are those of `strapgen.fixedpoint.quantize`."""
     quantities, plan = _plan(program, settings)
     finest = _walk(program, settings, quantities, plan, {})
     if settings.multiply in LOST:
         context = _high_products(program, settings, quantities, plan, finest)
-        return _with_accumulation(context, _fixed_program(context))
+        return Planned(quantities, plan, context, _fixed_program(context))
     coarser = aligning(finest.body, finest.values, plan.forced)
     shorter = _walk(program, settings, quantities, plan, coarser)
-    context, fixed = finest, _fixed_program(finest)
-    aligned = _fixed_program(shorter)
-    if not _is_worse(aligned, fixed):
-        context, fixed = shorter, aligned
-    if high and not settings.digits:
-        narrowed = _high_words(program, settings, quantities, plan, context)
+    one, other = (Planned(quantities, plan, walk, _fixed_program(walk)) for walk in (finest, shorter))
+    return one if _is_worse(other.fixed, one.fixed) else other
+
+
+def finished(planned: Planned) -> FixedProgram:
+    """Return the program, with sums narrowed to high words where that saves operations, and with its accumulation."""
+    context, fixed = planned.context, planned.fixed
+    if not context.settings.digits and context.settings.multiply != "high":
+        narrowed = _high_words(planned)
         if narrowed is not None:
             program_of = _fixed_program(narrowed)
             if sum(program_of.operations.values()) < sum(fixed.operations.values()):
@@ -112,10 +122,10 @@ def _with_accumulation(context: Quantization, fixed: FixedProgram) -> FixedProgr
     return replace(fixed, interface=interface)
 
 
-def _high_words(
-    program: Program, settings: Settings, quantities: Quantities, plan: FormatPlan, other: Quantization
-) -> Quantization | None:
+def _high_words(planned: Planned) -> Quantization | None:
     """Return a walk that narrows sums to their high words, where that costs no more than a sixtieth in error."""
+    other, quantities, plan = planned.context, planned.quantities, planned.plan
+    program, settings = other.program, other.settings
     if other.resets:
         return None
     outputs, transition = _result_names(program, quantities)

@@ -8,12 +8,13 @@ Where it takes fewer multiplications, the increments are multiplied with s first
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import lru_cache
+from typing import Generic, TypeVar
 
-from strapgen.fixedpoint.quantities import is_power_of_two
 from strapgen.ir.program import (
     Assignment,
     Constant,
@@ -28,10 +29,14 @@ from strapgen.ir.program import (
 from strapgen.ir.signals import Signal
 from strapgen.ir.units import Sensor
 
+T = TypeVar("T")
+
 #: Changes of a weight that are tried, the smallest first: none stays where no other costs less.
 _CHANGES = sorted(range(-6, 7), key=abs)
-#: A scale for which no product of coefficients is a power of two by chance: it tells what weights cost.
+#: A scale for which no product of coefficients is a power of two by chance, an odd number over a power of two: it tells
+#: what weights cost.
 _STAND_IN = Fraction(10007, 16384)
+_ONE = Fraction(1)
 #: Programs with more operations keep the weights of their lowest degrees.
 _MOST_OPERATIONS = 600
 #: Names of the inputs that a gyro counts: those of a step, and that of a loop where it is an angle increment.
@@ -70,7 +75,7 @@ def in_counts(program: Program, sensor: Sensor) -> Program:
     if all(node.kind in _LINEAR for node in operations):
         candidates.insert(0, (folded, dict(_weights(folded, tuple(elements)))))
     program, weights = min(candidates, key=lambda pair: _total_cost(*pair))
-    scaling = _Scaling(sensor.scale, weights)
+    scaling = _Scaling(weights, sensor.scale)
     body = tuple(replace(a, value=scaling.assigned(a)) for a in program.body)
     notes = (*program.notes, _note(program, weights, sensor))
     return replace(program, info=replace(program.info, notes=notes), body=body)
@@ -124,69 +129,137 @@ def _rename(node: Node, names: Mapping[str, str]) -> Node:
 
 def _total_cost(program: Program, weights: Mapping[str, int]) -> int:
     """Return the multiplications of a program in counts."""
-    scaling = _Scaling(_STAND_IN, weights)
-    return sum(_cost(scaling.assigned(assignment)) for assignment in program.body)
+    scaling = _Multiplications(weights)
+    return sum(scaling.number(assignment) for assignment in program.body)
 
 
 @dataclass(frozen=True)
-class _Scaling:
-    """Writes nodes in counts."""
+class _InCounts(ABC, Generic[T]):
+    """Goes through nodes in counts, and makes of each what a subclass says."""
 
-    scale: Fraction
     weights: Mapping[str, int]  # by name, the k for which the program in counts holds the value over scale**k
 
-    def assigned(self, assignment: Assignment) -> Node:
-        """Return the right side of an assignment in counts."""
-        return self.times(assignment.value, Fraction(1), -self.weights.get(assignment.name, 0))
+    @abstractmethod
+    def _constant(self, value: Fraction, power: int) -> T:
+        """Make ``value * scale**power``."""
 
-    def times(self, node: Node, factor: Fraction, power: int) -> Node:
-        """Return ``node * factor * scale**power``; a factor goes down to the constants."""
+    @abstractmethod
+    def _reference(self, node: Reference) -> T:
+        """Make a name."""
+
+    @abstractmethod
+    def _operation(self, kind: str, arguments: list[T]) -> T:
+        """Make an operation."""
+
+    @abstractmethod
+    def _multiple(self, made: T, factor: Fraction, power: int) -> T:
+        """Make ``made * factor * scale**power``."""
+
+    @abstractmethod
+    def _shortest(self, several: list[T]) -> T:
+        """Return the one with the fewest multiplications, the first of several."""
+
+    def assigned(self, assignment: Assignment) -> T:
+        """Return what is made of the right side of an assignment in counts."""
+        return self.times(assignment.value, _ONE, -self.weights.get(assignment.name, 0))
+
+    def times(self, node: Node, factor: Fraction, power: int) -> T:
+        """Return what is made of ``node * factor * scale**power``; a factor goes down to the constants."""
         if isinstance(node, Constant):
-            return Constant(node.value * self._factor(factor, power))
+            return self._constant(_times(factor, node.value), power)
         if isinstance(node, Reference):
-            return self._multiple(node, factor, power + self.weights.get(node.name, 0))
+            return self._multiple(self._reference(node), factor, power + self.weights.get(node.name, 0))
         if node.kind in ("add", "subtract", "negate"):
-            return Operation(node.kind, tuple(self.times(n, factor, power) for n in node.arguments))
+            return self._operation(node.kind, [self.times(n, factor, power) for n in node.arguments])
         if node.kind == "multiply":
             left, right = node.arguments
             return self._product(left, right, factor, power)
-        plain = Operation(node.kind, tuple(self.times(n, Fraction(1), 0) for n in node.arguments))
+        plain = self._operation(node.kind, [self.times(n, _ONE, 0) for n in node.arguments])
         return self._multiple(plain, factor, power)
 
-    def _product(self, left: Node, right: Node, factor: Fraction, power: int) -> Node:
+    def _product(self, left: Node, right: Node, factor: Fraction, power: int) -> T:
         for constant, other in ((left, right), (right, left)):
             if isinstance(constant, Constant):
-                return self.times(other, factor * constant.value, power)
+                return self.times(other, _times(factor, constant.value), power)
         if not _is_linear(left) and not _is_linear(right):
             power += sum(self._weight(node) for node in (left, right))
-            product = Operation("multiply", (self._bare(left), self._bare(right)))
+            product = self._operation("multiply", [self._bare(left), self._bare(right)])
             return self._multiple(product, factor, power)
         if not _is_linear(left):
             inner = self.times(right, factor, power + self._weight(left))
-            return Operation("multiply", (self._bare(left), inner))
+            return self._operation("multiply", [self._bare(left), inner])
         if not _is_linear(right):
             inner = self.times(left, factor, power + self._weight(right))
-            return Operation("multiply", (inner, self._bare(right)))
+            return self._operation("multiply", [inner, self._bare(right)])
         splits = {-self.weights.get(n.name, 0) for n in walk(right) if isinstance(n, Reference)}
-        products = [
-            Operation("multiply", (self.times(left, factor, power - k), self.times(right, Fraction(1), k)))
-            for k in sorted(splits | {0})
-        ]
-        return min(products, key=_cost)
+        return self._shortest(
+            [
+                self._operation("multiply", [self.times(left, factor, power - k), self.times(right, _ONE, k)])
+                for k in sorted(splits | {0})
+            ]
+        )
 
     def _weight(self, node: Node) -> int:
         return self.weights.get(node.name, 0) if isinstance(node, Reference) else 0
 
-    def _bare(self, node: Node) -> Node:
-        """Return a name, or an operation that is no sum of products, without a factor."""
-        return self.times(node, Fraction(1), -self._weight(node))
+    def _bare(self, node: Node) -> T:
+        """Return what is made of a name, or of an operation that is no sum of products, without a factor."""
+        return self.times(node, _ONE, -self._weight(node))
 
-    def _multiple(self, node: Node, factor: Fraction, power: int) -> Node:
+
+@dataclass(frozen=True)
+class _Scaling(_InCounts[Node]):
+    """Writes nodes in counts."""
+
+    scale: Fraction
+
+    def _constant(self, value: Fraction, power: int) -> Node:
+        return Constant(self._factor(value, power))
+
+    def _reference(self, node: Reference) -> Node:
+        return node
+
+    def _operation(self, kind: str, arguments: list[Node]) -> Node:
+        return Operation(kind, tuple(arguments))
+
+    def _multiple(self, made: Node, factor: Fraction, power: int) -> Node:
         value = self._factor(factor, power)
-        return node if value == 1 else Operation("multiply", (Constant(value), node))
+        return made if value == 1 else Operation("multiply", (Constant(value), made))
+
+    def _shortest(self, several: list[Node]) -> Node:
+        return min(several, key=_cost)
 
     def _factor(self, factor: Fraction, power: int) -> Fraction:
         return factor * _power_of(self.scale, power) if power else factor
+
+
+#: What stands in counts of multiplications for a constant that is a shift, and for any other.
+_SHIFT, _FACTOR = -1, -2
+
+
+class _Multiplications(_InCounts[int]):
+    """Counts the multiplications that are no shifts of nodes in counts, with `_STAND_IN` for the scale."""
+
+    def number(self, assignment: Assignment) -> int:
+        """Return the number of the right side of an assignment."""
+        return max(self.assigned(assignment), 0)
+
+    def _constant(self, value: Fraction, power: int) -> int:
+        return _SHIFT if _is_shift(value, power) else _FACTOR
+
+    def _reference(self, node: Reference) -> int:
+        return 0
+
+    def _operation(self, kind: str, arguments: list[int]) -> int:
+        return sum(
+            [number for number in arguments if number > 0], kind == "multiply" and _SHIFT not in arguments
+        )
+
+    def _multiple(self, made: int, factor: Fraction, power: int) -> int:
+        return made if _is_shift(factor, power) else made + 1
+
+    def _shortest(self, several: list[int]) -> int:
+        return min(several)
 
 
 @lru_cache(maxsize=256)
@@ -199,14 +272,30 @@ def _is_linear(node: Node) -> bool:
     return isinstance(node, Operation) and node.kind in _LINEAR
 
 
+def _times(factor: Fraction, value: Fraction) -> Fraction:
+    return value if factor is _ONE else factor * value
+
+
 def _cost(node: Node) -> int:
     """Return the number of multiplications that are no shifts."""
     products = (n for n in walk(node) if isinstance(n, Operation) and n.kind == "multiply")
-    return sum(not any(_is_shift(n) for n in product.arguments) for product in products)
+    return sum(
+        not any(isinstance(n, Constant) and _is_shift(n.value) for n in product.arguments)
+        for product in products
+    )
 
 
-def _is_shift(node: Node) -> bool:
-    return isinstance(node, Constant) and (not node.value or is_power_of_two(node.value))
+def _is_shift(factor: Fraction, power: int = 0) -> bool:
+    """Return whether ``factor * _STAND_IN**power`` is zero or a power of two, up to its sign."""
+    top, bottom = abs(factor.numerator), factor.denominator
+    if power > 0:  # in lowest terms, what is odd below must cancel what is odd of the scale
+        bottom, rest = divmod(bottom, _STAND_IN.numerator**power)
+        return not top or (not rest and top & (top - 1) == 0 and bottom & (bottom - 1) == 0)
+    if power < 0 and top:
+        top, rest = divmod(top, _STAND_IN.numerator**-power)
+        if rest:
+            return False
+    return top & (top - 1) == 0 and bottom & (bottom - 1) == 0
 
 
 # Weights
@@ -283,7 +372,7 @@ def _descend(program: Program, groups: list[tuple[str, ...]], weights: dict[str,
         for name in set(references(assignment.value)) & {*users}:
             users[name].append(assignment)
     scalars = {group[0] for group in groups if len(group) == 1}
-    scaling, improved = _Scaling(_STAND_IN, weights), True
+    scaling, improved = _Multiplications(weights), True
     involved = {a.name: sorted({a.name, *references(a.value)} & {*weights}) for a in program.body}
     known: dict[tuple[str, tuple[int, ...]], int] = {}
 
@@ -291,7 +380,7 @@ def _descend(program: Program, groups: list[tuple[str, ...]], weights: dict[str,
         """Return the multiplications of an assignment, which depend on the weights of its own names alone."""
         key = assignment.name, tuple([weights[name] for name in involved[assignment.name]])
         if key not in known:
-            known[key] = _cost(scaling.assigned(assignment))
+            known[key] = scaling.number(assignment)
         return known[key]
 
     while improved:

@@ -32,6 +32,12 @@ CARRIES = {
     "all": "that, and the rounding of every other value that is handed on and of every increment that goes out",
 }
 
+#: The order in which targets in floating point add, and what that is in words.
+SUMS = {
+    "canonical": "one term after the other, as the formulas stand",
+    "tree": "as balanced trees, in other bits",
+}
+
 #: Formats of the state that hold no magnitude of 1, as CMSIS has them, with the word that each goes with.
 STATES = {"q15": 16, "q31": 32, "q63": 64}
 
@@ -77,6 +83,7 @@ class StatedSettings(TypedDict, total=False):
     state: str
     multiply: str
     digits: int
+    sums: str
 
 
 def with_settings(function: F) -> F:
@@ -133,6 +140,9 @@ class Settings(ReadOnly):
         alone, with words of 32 or 64 bits, or "half" for high words from half words, with words of 32 bits.
     digits : int
         Canonical signed digits of a constant that "shift-add" takes; 0 for all that a word has.
+    sums : str
+        Order of the sums of targets in floating point: "canonical", or "tree" for balanced trees. Sums in fixed point
+        are exact before they are rounded, and have no other.
     increments : int or None
         The number of increments a step that `Settings.of` was told; a program with another number is refused.
     whole_step : tuple or None
@@ -163,6 +173,7 @@ class Settings(ReadOnly):
     state: str = ""
     multiply: str = "product"
     digits: int = 0
+    sums: str = "canonical"
     increments: int | None = field(default=None, compare=False, repr=False)
     whole_step: _WholeStep | None = None
 
@@ -175,6 +186,7 @@ class Settings(ReadOnly):
         check_rounding(self.rounding)
         checks.choice("carry", self.carry, CARRIES)
         checks.choice("multiply", self.multiply, MULTIPLICATIONS)
+        checks.choice("sums", self.sums, SUMS)
         digits = checks.count("digits", self.digits, smallest=0, largest=self.word)
         object.__setattr__(self, "digits", digits)
         if self.digits and self.multiply != "shift-add":
@@ -389,11 +401,17 @@ class Settings(ReadOnly):
 
     @property
     def only_ranges(self) -> bool:
-        """Whether they state the ranges of inputs and nothing that belongs to fixed point alone."""
+        """Whether they state the ranges of inputs or the order of sums, and nothing of fixed point alone."""
         fixed = replace(
-            self, largest_angle=DEFAULT_ANGLE, ranges={}, stated="", increments=None, whole_step=None
+            self,
+            largest_angle=DEFAULT_ANGLE,
+            ranges={},
+            stated="",
+            increments=None,
+            whole_step=None,
+            sums="canonical",
         )
-        return self.states_ranges and fixed == _DEFAULTS
+        return (self.states_ranges or self.sums != "canonical") and fixed == _DEFAULTS
 
     @property
     def states_ranges(self) -> bool:
@@ -456,6 +474,7 @@ class Settings(ReadOnly):
             "state": self.state,
             "multiply": self.multiply,
             "digits": self.digits,
+            **({} if self.sums == "canonical" else {"sums": self.sums}),
             **({} if self.whole_step is None else {"whole_step": list(self.whole_step)}),
         }
 

@@ -20,7 +20,7 @@ from strapgen.ir.exceptions import InputError
 from strapgen.lab.motions.motion_names import is_file
 from strapgen.lab.recordings.attitude_names import TRAJECTORIES
 from strapgen.lab.recordings.log_topic import split_topic
-from strapgen.run.backend_names import ORDERS
+from strapgen.run.orders import ORDERS
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -26,7 +26,7 @@ from strapgen.results import figures
 from strapgen.results.records import INTERNAL, entry, properties
 from strapgen.results.result import Result
 from strapgen.results.table import Column, TextTable
-from strapgen.run.backend_names import SEQUENTIAL
+from strapgen.run.orders import SEQUENTIAL
 
 if TYPE_CHECKING:
     from strapgen.catalogue import Choice

@@ -17,7 +17,7 @@ from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError
 from strapgen.lab.recordings.attitude_options import FormOptions, TruthOptions
 from strapgen.lab.run_options import ONE_SCALE, SOURCE_NEEDED, RunOptions, RunOutput, SampleSource, described
-from strapgen.run.backend_names import SEQUENTIAL
+from strapgen.run.orders import SEQUENTIAL
 
 if TYPE_CHECKING:
     from strapgen.catalogue import Choice

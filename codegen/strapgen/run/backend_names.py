@@ -88,14 +88,6 @@ BUILT_IN = {
     ),
 }
 
-
-#: Order in which the steps of a run are multiplied: one after the other, the default; or in blocks, whose products are
-#: multiplied then.
-SEQUENTIAL = "sequential"
-ORDERS = (SEQUENTIAL, "scan")
-#: Back ends whose code has the order "scan".
-SCANNING = ("c", "c-float")
-
 #: Other names of back ends, which every command takes too.
 ALIASES = {"c-q31": "c-fixed32", "c-q15": "c-fixed16"}
 

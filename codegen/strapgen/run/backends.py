@@ -22,18 +22,11 @@ from strapgen.ir.read_only import read_only
 from strapgen.ir.renamed import renamed, renamed_parameters
 from strapgen.ir.sources import Sources
 from strapgen.registry import Merged
-from strapgen.run.backend_names import (
-    BACKENDS,
-    DEFAULT_BACKENDS,
-    ORDERS,
-    SCANNING,
-    SEQUENTIAL,
-    Entry,
-    of_sources,
-)
+from strapgen.run.backend_names import BACKENDS, DEFAULT_BACKENDS, Entry, of_sources
 from strapgen.run.evaluators import Array, Evaluator, Loop, in_si
 from strapgen.run.increments import PART, run_parts
 from strapgen.run.kernel_sources import StepSources, sources_of_choice
+from strapgen.run.orders import ORDERS, SCANNING, SEQUENTIAL
 from strapgen.targets.registry import NUMPY, TARGETS
 
 __all__ = [

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from functools import cache, cached_property, partial
 from itertools import accumulate, pairwise
-from math import isfinite
+from operator import le
 from typing import Any
 
 import numpy as np
@@ -15,8 +16,8 @@ from strapgen.ir.exceptions import InputError
 from strapgen.ir.program import COUNTED_AS
 from strapgen.ir.sources import Sources
 from strapgen.run import compiler
-from strapgen.run.backend_names import ORDERS
-from strapgen.run.evaluators import Array, Evaluator, Loop
+from strapgen.run.evaluators import Array, Evaluator, Loop, fresh_feedback
+from strapgen.run.orders import ORDERS
 from strapgen.targets import TARGETS
 
 #: The types of floating-point targets in numpy.
@@ -60,9 +61,8 @@ class CEvaluator(Evaluator):
             self.word_type, self.feedback_type = np.dtype(f"int{word}"), np.dtype(f"uint{word}")
         self.module: Any = compiler.load(sources)
         self._array = getattr(self.module.lib, f"{self.function.name}_array")
-        self._takes_one = fixed is None
         #: Memory for calls on one sample, of which every thread takes its own.
-        self._idle: list[_OneSample] = []
+        self._idle: list[_OneSample | _OneFixedSample] = []
         self.scans = hasattr(self.module.lib, f"{self.function.name}_scan")
 
     @property
@@ -72,12 +72,12 @@ class CEvaluator(Evaluator):
         return self.sources.target if fixed is None else f"{self.sources.target}{fixed.settings.word}"
 
     def __call__(self, *values: Any) -> Any:
-        """Evaluate the kernel, see `Evaluator.__call__`: one sample in floating point where it lies."""
-        if self._takes_one and self.one_sample(values):
+        """Evaluate the kernel, see `Evaluator.__call__`: one sample with memory that is there."""
+        if self.one_sample(values):
             try:
                 one = self._idle.pop()
             except IndexError:
-                one = _OneSample(self)
+                one = _OneSample(self) if self.sources.fixed is None else _OneFixedSample(self)
             results = one.run(values)
             self._idle.append(one)
             if results is not None:
@@ -195,11 +195,7 @@ class _OneSample:
     def __init__(self, evaluator: CEvaluator) -> None:
         signals, results = evaluator.function.inputs, evaluator.function.outputs
         self._numbers = np.empty(sum(signal.size for signal in signals), evaluator.dtype)
-        edges = [0, *accumulate(signal.size for signal in signals)]
-        self._inputs = [
-            self._numbers[first:stop].reshape(signal.shape)
-            for (first, stop), signal in zip(pairwise(edges), signals, strict=True)
-        ]
+        self._inputs = _parts_of(self._numbers, [signal.shape for signal in signals])
         self._results = [np.empty(signal.shape, evaluator.dtype) for signal in results]
         pointers = map(evaluator.pointer, (*self._inputs, *self._results))
         self._call = partial(evaluator._array, 1, *pointers)
@@ -208,11 +204,64 @@ class _OneSample:
         """Return the output of the function, or its outputs, for finite inputs; None for others."""
         for place, value in zip(self._inputs, values):  # noqa: B905  # of one length
             place[...] = value
-        if not isfinite(sum(self._numbers.tolist())):
+        if not math.isfinite(sum(self._numbers.tolist())):
             return None
         self._call()
         results = self._results
         return results[0].copy() if len(results) == 1 else tuple([result.copy() for result in results])
+
+
+class _OneFixedSample:
+    """Memory of a function in fixed point for one sample: its numbers, and the integers that stand for them."""
+
+    def __init__(self, evaluator: CEvaluator) -> None:
+        fixed = evaluator.interface
+        shapes = [signal.shape for signal in evaluator.function.inputs]
+        elements = [argument for argument in fixed.inputs for _ in range(argument.signal.size)]
+        self._units = np.array([float(argument.unit) for argument in elements])
+        self._lows, self._highs = [a.low for a in elements], [a.high for a in elements]
+        self._numbers, self._scaled = np.empty(len(elements)), np.empty(len(elements))
+        self._inputs = _parts_of(self._numbers, shapes)
+        self._rounded = _parts_of(self._scaled, shapes)
+        self._words = [
+            np.empty(shape, kind) for shape, kind in zip(shapes, evaluator.input_types, strict=True)
+        ]
+        self._fresh = fresh_feedback(fixed, 1).astype(evaluator.feedback_type)
+        self._feedback = self._fresh.copy()
+        self._results = [
+            (np.empty(argument.signal.shape, evaluator.word_type), float(argument.unit))
+            for argument in fixed.outputs
+        ]
+        self._status = evaluator.module.ffi.new("int *")
+        carried = [self._feedback] if fixed.residuals else []
+        arrays = (*self._words, *carried, *(words for words, _ in self._results))
+        self._call = partial(evaluator._array, 1, self._status, *map(evaluator.pointer, arrays))
+
+    def run(self, values: Sequence[Array]) -> Any:
+        """Return the output of the function, or its outputs; None for inputs out of their ranges, or refused."""
+        for place, value in zip(self._inputs, values):  # noqa: B905  # of one length
+            place[...] = value
+        with np.errstate(all="ignore"):  # what overflows is out of its range
+            np.divide(self._numbers, self._units, self._scaled)  # exact for formats: powers of two
+        integers = np.rint(self._scaled, self._scaled).tolist()
+        # No comparison holds of what is no number.
+        if not (all(map(le, self._lows, integers)) and all(map(le, integers, self._highs))):
+            return None
+        for words, rounded in zip(self._words, self._rounded):  # noqa: B905  # of one length
+            words[...] = rounded
+        self._feedback[...] = self._fresh
+        self._status[0] = 0
+        self._call()
+        if self._status[0]:
+            return None
+        results = [np.multiply(words, unit, np.empty(words.shape)) for words, unit in self._results]
+        return results[0] if len(results) == 1 else tuple(results)
+
+
+def _parts_of(numbers: Array, shapes: Sequence[tuple[int, ...]]) -> list[Array]:
+    """Return the parts of a row of numbers that are arrays of some shapes, one after the other."""
+    edges = [0, *accumulate(map(math.prod, shapes))]
+    return [numbers[i:j].reshape(shape) for (i, j), shape in zip(pairwise(edges), shapes, strict=True)]
 
 
 class ModelEvaluator(Evaluator):

@@ -18,7 +18,7 @@ from strapgen.ir.fixed_settings import DEFAULT_ALLOWANCE
 from strapgen.ir.interfaces import Argument, Interface
 from strapgen.ir.notebook_display import counted_shape, short_repr
 from strapgen.ir.sources import Function, Sources
-from strapgen.run.backend_names import SEQUENTIAL
+from strapgen.run.orders import SEQUENTIAL
 
 Array = NDArray[Any]
 

@@ -179,10 +179,8 @@ def _words(
             value = own[key]
         elif option.is_argument and key in ("algorithm", "algorithms", "kernels"):
             value = variant.options["algorithm"]
-        elif command == "generate" or (group is not None and issubclass(group, MethodOptions)):
+        elif command == "generate" or (group is not None and issubclass(group, MethodOptions | FixedOptions)):
             value = variant.options.get(key)
-        elif group is not None and issubclass(group, FixedOptions):
-            value = variant.options.get(key) if is_fixed else None
         elif key == "target":
             value = variant.targets[0]
         elif key == "backend":
@@ -191,8 +189,10 @@ def _words(
             value = variant.step
         else:
             continue
-        if group is not None and issubclass(group, FixedOptions) and not is_fixed:
-            continue
+        if group is not None and issubclass(group, FixedOptions):
+            is_taken = not is_fixed and "target" in keys if key == "sums" else is_fixed
+            if not is_taken:
+                continue
         if (
             key == "word"
             and "backend" in keys

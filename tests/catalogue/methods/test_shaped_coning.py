@@ -15,8 +15,8 @@ from strapgen import choose, derive
 from strapgen.catalogue.methods import coning_coefficients, coning_drift, shaped_coning
 from strapgen.catalogue.methods.coning import BAND, weights
 from strapgen.catalogue.methods.coning_drift import ConingShape
+from strapgen.catalogue.methods.sensor_response import Response
 from strapgen.catalogue.methods.shaped_coning import SHAPES, read
-from strapgen.catalogue.methods.window import GyroResponse
 from strapgen.ir.exceptions import InputError
 
 FOLDER = Path(shaped_coning.__file__).parent / "coning_shapes"
@@ -188,16 +188,16 @@ def test_one_sample_has_nothing_to_be_crossed_with():
     np.testing.assert_array_equal(single.propagate(turn), plain.propagate(turn))
 
 
-GYRO = GyroResponse(Fraction(40), Fraction(3, 5), Fraction(100))
+GYRO = Response(frequency_hz=Fraction(40), damping=Fraction(3, 5), sample_hz=Fraction(100))
 SIMULATED = [ConingShape(1, 3), ConingShape(3, 0), ConingShape(2, 2, GYRO)]
 
 
-def response(gyro: GyroResponse | None, b: float) -> complex:
+def response(gyro: Response | None, b: float) -> complex:
     """Return what the gyro does to the frequency b in rad a sample, from its transfer function."""
     if gyro is None:
         return 1.0
     s = 1j * b * float(gyro.sample_hz)
-    w = 2 * math.pi * float(gyro.bandwidth_hz)
+    w = 2 * math.pi * float(gyro.frequency_hz)
     return 1 / (1 + 2 * float(gyro.damping) * s / w + (s / w) ** 2)
 
 
@@ -273,6 +273,6 @@ def response_of(gyro, b):
     s = (
         mpmath.mpc(0, 1)
         * x
-        / (2 * pi * mpmath.mpf(gyro.bandwidth_hz.numerator) / gyro.bandwidth_hz.denominator)
+        / (2 * pi * mpmath.mpf(gyro.frequency_hz.numerator) / gyro.frequency_hz.denominator)
     )
     return 1 / (1 + 2 * mpmath.mpf(gyro.damping.numerator) / gyro.damping.denominator * s + s**2)

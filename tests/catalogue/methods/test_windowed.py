@@ -11,7 +11,8 @@ import pytest
 import strapgen
 from strapgen import choose, derive, lower
 from strapgen.analysis.series.series import series
-from strapgen.catalogue.methods.window import GyroResponse, Window
+from strapgen.catalogue.methods.sensor_response import Response
+from strapgen.catalogue.methods.window import Window
 from strapgen.catalogue.methods.windows import WINDOWS, read
 from strapgen.design.family import FamilyBrief, design
 from strapgen.fixedpoint.floating.bounds import rounding_bounds
@@ -242,7 +243,7 @@ def test_the_stated_order_of_a_window_is_that_of_its_error(method, order):
 @pytest.mark.long
 def test_a_window_for_a_gyro_takes_out_its_response():
     # A gyro of second order sees a vibration of forty lines; the window is designed for its bandwidth.
-    gyro = GyroResponse(Fraction(40), Fraction(7071, 10000), Fraction(100))
+    gyro = Response(frequency_hz=Fraction(40), damping=Fraction(7071, 10000), sample_hz=Fraction(100))
     window = design(FamilyBrief(7, 7, Fraction("1.9"), conditions=2, gyro=gyro))
     vibration = strapgen.motion("vibration", angle_deg=0.1, gyro_hz=40)
     run = strapgen.simulate(strapgen.backend("euler", window, backend="c"), vibration, "0.01", 60)

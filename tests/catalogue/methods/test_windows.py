@@ -11,15 +11,15 @@ from pathlib import Path
 import pytest
 import sympy as sp
 
-from strapgen.catalogue.methods import window_conditions, windows
-from strapgen.catalogue.methods.window import GyroResponse
+from strapgen.catalogue.methods import sensor_response, window_conditions, windows
+from strapgen.catalogue.methods.sensor_response import Response
 from strapgen.catalogue.methods.windows import WINDOW_TITLES, WINDOWS, read, verify
 from strapgen.ir.exceptions import InputError
 from strapgen.storage import resources
 
 FOLDER = Path(windows.__file__).parent / "window_filters"
 FAMILIES = pytest.mark.parametrize("name", WINDOW_TITLES)
-GYRO = GyroResponse(Fraction(40), Fraction(7071, 10000), Fraction(100))
+GYRO = Response(frequency_hz=Fraction(40), damping=Fraction(7071, 10000), sample_hz=Fraction(100))
 
 
 # The built-in files
@@ -173,7 +173,7 @@ def test_legendre_coefficients_of_powers_are_those_of_sympy():
 def test_a_gyro_shows_the_polynomial_that_its_equation_has_for_solution():
     # y + 2 zeta y'/w + y''/w^2 = t^k has one polynomial solution; its increments are the row.
     t = sp.Symbol("t")
-    inverse = sp.Rational(GYRO.sample_hz / (2 * window_conditions.PI * GYRO.bandwidth_hz))
+    inverse = sp.Rational(GYRO.sample_hz / (2 * sensor_response.PI * GYRO.frequency_hz))
     damping = sp.Rational(GYRO.damping)
     rows = window_conditions.increments((1, 2, 3), 5, GYRO)
     for k, row in enumerate(rows):
@@ -187,7 +187,7 @@ def test_a_gyro_shows_the_polynomial_that_its_equation_has_for_solution():
 
 
 def test_pi_is_that_of_double_precision():
-    assert abs(window_conditions.PI - Fraction(str(sp.pi.evalf(40)))) < Fraction(1, 10**16)
+    assert abs(sensor_response.PI - Fraction(str(sp.pi.evalf(40)))) < Fraction(1, 10**16)
 
 
 def test_a_window_for_a_gyro_has_no_mirror_image():
@@ -248,18 +248,18 @@ def test_a_file_is_read_and_named_after_its_title(written):
 
 
 def test_gyro_series_is_the_inverse_of_its_denominator():
-    """All terms of the product with 1 + 2 zeta s/w + s^2/w^2 vanish but the first, exactly."""
-    terms, inverse = 9, GYRO.sample_hz / (2 * window_conditions.PI * GYRO.bandwidth_hz)
+    """The product with 1 + 2 zeta s/w + s^2/w^2 is the series of a sample's integral alone, exactly."""
+    terms, inverse = 9, GYRO.sample_hz / (2 * sensor_response.PI * GYRO.frequency_hz)
     denominator = [Fraction(1), 2 * GYRO.damping * inverse, inverse**2]
-    series = window_conditions.gyro_series(GYRO, terms)
+    series = GYRO.series(terms)
     product = [sum(d * series[n - k] for k, d in enumerate(denominator[: n + 1])) for n in range(terms)]
-    assert product == [1] + [0] * (terms - 1)
+    assert product == Response().series(terms)
 
 
 def test_a_gyro_needs_filters_for_both_sides(written):
     # c_0 of a gyro: its lag 2 zeta/w, times the slope of the rate, is added again.
     gyro = "{bandwidth_hz = 40, damping = '0.7071', sample_hz = 100}"
-    lag = -window_conditions.gyro_series(GYRO, 2)[1]
+    lag = -GYRO.series(2)[1]
     row = f'["{-lag / 2}", 1, "{lag / 2}"]'
     filters = f'[{row}, ["-1/4", 0, "1/4"]]'
     with pytest.raises(InputError, match="one_sided lacks the filters with 2 samples before and 0 ahead"):
@@ -315,8 +315,9 @@ def test_a_gyro_needs_filters_for_both_sides(written):
             {"filters": '[[1, 0, 0], ["-1/4", 0, "1/4"]]'},
             "filters row 1, of c_0, is the sum of the step's samples",
         ),
-        ({"gyro": "3"}, "gyro is 3; a table with bandwidth_hz, damping, sample_hz is needed"),
-        ({"gyro": "{damping = 1}"}, "gyro.bandwidth_hz is missing; a number above 0 in Hz is needed"),
+        ({"gyro": "3"}, "gyro is 3; a table with filter, order, frequency_hz, damping"),
+        ({"gyro": "{damping = 1}"}, "gyro.frequency_hz is missing; a filter second-order has frequency_hz"),
+        ({"gyro": "{filter = 'bessel', order = 3, frequency_hz = 9}"}, "gyro.sample_hz is missing"),
         (
             {"gyro": "{bandwidth_hz = 40, damping = 0, sample_hz = 100}"},
             "gyro.damping is 0; a number above 0",

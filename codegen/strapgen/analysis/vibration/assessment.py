@@ -10,9 +10,11 @@ from collections.abc import Sequence
 from dataclasses import replace
 from fractions import Fraction
 from functools import lru_cache
-from typing import NamedTuple
+from typing import Any
 
+import mpmath
 import sympy as sp
+from sympy.utilities.lambdify import implemented_function
 
 from strapgen import catalogue, pipeline
 from strapgen.analysis.vibration import response, systems
@@ -20,9 +22,10 @@ from strapgen.analysis.vibration.mean_rates import Assessment
 from strapgen.analysis.vibration.response import Form, Pair
 from strapgen.analysis.vibration.systems import ANGLES, T_M, VELOCITIES, F, T
 from strapgen.catalogue import AnyAlgorithm, Choice
+from strapgen.catalogue.methods.sensor_response import Response, parse
 from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError
-from strapgen.kernel.algebra import exact
+from strapgen.ir.renamed import renamed_parameters, warn
 from strapgen.kernel.kernel import Kernel
 
 
@@ -223,22 +226,30 @@ def _of(choice: Choice, quantity: str) -> Assessment:
 _of_catalogue = lru_cache(maxsize=64)(_of)
 
 
-def through_gyro(
-    assessment: Assessment, bandwidth_hz: float | str | Fraction, damping: float | str | Fraction
-) -> Assessment:
-    """Return the assessment of an algorithm that sees angles through a gyro of second order.
+#: A response: itself or in words; a gyro of second order of before as its natural frequency in Hz and damping.
+AnyResponse = Response | str | tuple[float | str | Fraction, float | str | Fraction]
 
-    The gyro's transfer function is G = 1/(1 + 2 zeta s/w + s^2/w^2). A product of two angles has the factor
-    ``|G|^2``, one of an angle and a velocity the factor G; the true rate stays what it is.
+
+@renamed_parameters(bandwidth_hz="response")
+def through_gyro(
+    assessment: Assessment,
+    response: AnyResponse | float | Fraction,
+    damping: float | str | Fraction | None = None,
+) -> Assessment:
+    """Return the assessment of an algorithm that sees angles through a gyro.
+
+    With the gyro's response G a product of two angles has the factor ``|G|^2``, one of an angle and a velocity the
+    factor G; the true rate stays what it is.
 
     Parameters
     ----------
     assessment : Assessment
         Of a step, of the vector of one, or of an algorithm in two speeds.
-    bandwidth_hz : number
-        Natural frequency w/(2 pi) in Hz.
-    damping : number
-        zeta.
+    response : Response or str
+        A response, or its words: "second-order:80:0.7" has the natural frequency w/(2 pi) in Hz and the damping. One
+        of taps, decimation or instants has its sampling frequency.
+    damping : number, optional
+        Old: of a gyro of second order, whose natural frequency in Hz is in place of its response.
 
     Returns
     -------
@@ -253,19 +264,15 @@ def through_gyro(
     --------
     >>> from strapgen import choose
     >>> from strapgen.analysis.vibration import of
-    >>> seen = through_gyro(of(choose("euler", "coning-compressed", 4)), 40, "0.7071")
+    >>> seen = through_gyro(of(choose("euler", "coning-compressed", 4)), "second-order:40:0.7071")
     >>> [float(f"{rate:.4g}") for rate in seen.rates(10, 0.04, theta_x=0.01, theta_y=0.01, phase=1)]
     [-0.002644, -0.002633, 1.037e-05]
     """
-    gyro = (bandwidth_hz, damping)
+    gyro: Any = response if damping is None else (response, damping)
     return through_gyros(assessment, gyro, gyro)
 
 
-def through_gyros(
-    assessment: Assessment,
-    x: tuple[float | str | Fraction, float | str | Fraction],
-    y: tuple[float | str | Fraction, float | str | Fraction],
-) -> Assessment:
+def through_gyros(assessment: Assessment, x: AnyResponse, y: AnyResponse) -> Assessment:
     """Return the assessment of an algorithm that sees the angles about x and y through gyros of their own.
 
     Gyros of unequal phase show a coning that is not there: pseudo-coning.
@@ -274,8 +281,8 @@ def through_gyros(
     ----------
     assessment : Assessment
         As for `through_gyro`.
-    x, y : tuple of number
-        Natural frequency in Hz and damping of the gyro of each axis.
+    x, y : Response or str
+        The response of the gyro of each axis.
 
     Returns
     -------
@@ -293,25 +300,24 @@ def through_gyros(
     >>> from strapgen import choose
     >>> from strapgen.analysis.vibration import of
     >>> plain, wave = of(choose("euler", "coning-compressed", 4)), {"theta_x": 0.01, "theta_y": 0.01}
-    >>> through_gyros(plain, (80, "0.7"), (80, "0.7")).rates(20, 0.004, **wave).computed
+    >>> slow, fast = "second-order:60:0.7", "second-order:80:0.7"
+    >>> through_gyros(plain, fast, fast).rates(20, 0.004, **wave).computed
     0.0
-    >>> round(through_gyros(plain, (80, "0.7"), (60, "0.7")).rates(20, 0.004, **wave).computed, 8)
+    >>> round(through_gyros(plain, fast, slow).rates(20, 0.004, **wave).computed, 8)
     0.00078679
     """
     if assessment.recursion and assessment.kernel != "two-speed":
         raise InputError(
             f"{assessment.kernel} is a fast loop; its rates through a gyro are those of two-speed, both loops together"
         )
-    responses = dict(zip(ANGLES, (_response(*gyro) for gyro in (x, y)), strict=True))
+    responses = dict(zip(ANGLES, map(_response, (x, y)), strict=True))
 
     def seen(pair: Pair, form: Form) -> Form:
         # The factor is G of the first channel times the conjugate of that of the second; velocities stay as they are.
         first, second = (responses.get(channel) for channel in pair)
         if first is None:  # of an angle and a velocity, the angle is the first
             return form
-        real, imaginary = (
-            (first.real, first.imaginary) if second is None else _conjugate_product(first, second)
-        )
+        real, imaginary = _factor(first, second)
         return Form(
             _times(form.real, real) - _times(form.imaginary, imaginary),
             _times(form.real, imaginary) + _times(form.imaginary, real),
@@ -322,32 +328,38 @@ def through_gyros(
     )
 
 
-class _Response(NamedTuple):
-    """The transfer function of a gyro, by real and imaginary part, and the square of its magnitude."""
-
-    real: sp.Expr
-    imaginary: sp.Expr
-    power: sp.Expr
-
-
-def _response(bandwidth_hz: float | str | Fraction, damping: float | str | Fraction) -> _Response:
-    natural, ratio = (
-        exact(checks.number(what, value, positive=True))
-        for what, value in (("gyro-bandwidth-hz", bandwidth_hz), ("gyro-damping", damping))
-    )
-    in_phase, across = 1 - (F / natural) ** 2, 2 * ratio * F / natural
-    power = 1 / (in_phase**2 + across**2)
-    return _Response(in_phase * power, -across * power, power)
+def _response(gyro: AnyResponse) -> Response:
+    """Return the response of what stands for one."""
+    if isinstance(gyro, tuple):
+        warn("bandwidth_hz and damping", "a response, as second-order:HZ:DAMPING")
+        frequency, damping = (
+            checks.number(what, value, positive=True)
+            for what, value in zip(("gyro-bandwidth-hz", "gyro-damping"), gyro, strict=True)
+        )
+        return Response(frequency_hz=frequency, damping=damping)
+    return gyro if isinstance(gyro, Response) else parse("response", gyro)
 
 
-def _conjugate_product(one: _Response, other: _Response) -> tuple[sp.Expr, sp.Expr]:
-    """Return one response times the conjugate of another."""
-    if one == other:
-        return one.power, sp.S.Zero
-    return (
-        one.real * other.real + one.imaginary * other.imaginary,
-        one.imaginary * other.real - one.real * other.imaginary,
-    )
+@lru_cache
+def _factor(first: Response, second: Response | None) -> tuple[sp.Expr, sp.Expr]:
+    """Return the real and imaginary part of G of an angle, or of it times the conjugate of that of another one.
+
+    They are functions of the frequency with a value, which a response of a table has as well, but no formula.
+    """
+
+    def gain(hertz: Any) -> Any:
+        context = mpmath.mp if isinstance(hertz, mpmath.mpf) else None
+        own = first.gain(hertz, context)
+        other = own if second == first else 1 if second is None else second.gain(hertz, context)
+        return own * other.conjugate()
+
+    def part(name: str, real: bool) -> sp.Expr:
+        function = sp.Function(name, real=True)
+        return implemented_function(function, lambda f: gain(f).real if real else gain(f).imag)(F)
+
+    if second == first:
+        return part("G_squared", True), sp.S.Zero
+    return part("G_real", True), part("G_imaginary", False)
 
 
 def _times(total: sp.Expr, factor: sp.Expr) -> sp.Expr:

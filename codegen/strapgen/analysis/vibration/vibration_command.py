@@ -5,12 +5,13 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from functools import partial
+from functools import cached_property, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 import typer
 
+from strapgen.cli import terminal
 from strapgen.cli.option_groups import Excludes, Needs, OneOf, Rule, Shown, grouped, rules, stated
 from strapgen.cli.options import ANY_STEP_OPTIONS, MethodOptions, Samples, SeveralMethods, option, samples
 from strapgen.cli.output import Output, plot_option
@@ -22,14 +23,32 @@ if TYPE_CHECKING:
     from strapgen.analysis.vibration import Assessment
     from strapgen.analysis.vibration.mean_rates import Curve
     from strapgen.analysis.vibration.vibration_report import AssessedCase, CaseRates
-    from strapgen.catalogue.methods.window import GyroResponse
+    from strapgen.catalogue.methods.sensor_response import Response
 
 
-#: The damping of a gyro of second order, beside its natural frequency.
-_DAMPING = "Damping of that gyro, as 0.7071."
-GYRO_DAMPING = option("--gyro-damping", metavar="RATIO", help=_DAMPING)
-#: Either option of that gyro needs the other
-GYRO_RULES = (Needs("--gyro-bandwidth-hz", "--gyro-damping"), Needs("--gyro-damping", "--gyro-bandwidth-hz"))
+#: What a response is on the command line.
+RESPONSE_WORDS = (
+    "a CSV file (frequency_hz, magnitude, and phase_deg or delay_s), or butterworth:ORDER:HZ, bessel:ORDER:HZ, "
+    "second-order:HZ:DAMPING, fir:TAP:TAP, decimation:N, delay:S, instants; several with + between"
+)
+#: The options of before for a gyro of second order
+_OLD = "Old: --response second-order:HZ:DAMPING."
+
+
+def _old_option(name: str, metavar: str) -> Any:
+    return option(name, metavar=metavar, help=_OLD, hidden=True)
+
+
+GYRO_RULES = (
+    Needs("--gyro-bandwidth-hz", "--gyro-damping"),
+    Needs("--gyro-damping", "--gyro-bandwidth-hz"),
+    Excludes("--response", "--gyro-bandwidth-hz"),
+)
+
+
+def say_old(words: str) -> None:
+    """Name the option in place of those of before."""
+    terminal.remark(f"strapgen: --gyro-bandwidth-hz and --gyro-damping are now --response {words}")
 
 
 @dataclass(frozen=True)
@@ -40,8 +59,8 @@ class BandOptions:
     rules: ClassVar[tuple[Rule, ...]] = (
         OneOf("--band --band-hz"),
         *GYRO_RULES,
-        Needs("--band-hz --gyro-bandwidth-hz --spectrum", "--sample-hz"),
-        Needs("--sample-hz", "--band-hz --gyro-bandwidth-hz --spectrum"),
+        Needs("--band-hz --response --gyro-bandwidth-hz --spectrum", "--sample-hz"),
+        Needs("--sample-hz", "--band-hz --response --gyro-bandwidth-hz --spectrum"),
     )
 
     band: Annotated[
@@ -59,19 +78,20 @@ class BandOptions:
     sample_hz: Annotated[
         Positive | None, option("--sample-hz", metavar="HZ", help="Samples of the gyro in a second.")
     ] = None
-    gyro_bandwidth_hz: Annotated[
-        Positive | None,
+    response: Annotated[
+        str | None,
         option(
-            "--gyro-bandwidth-hz",
-            metavar="HZ",
-            help="Natural frequency of a gyro of second order, whose response the design takes out.",
+            "--response",
+            metavar="FILE|WORDS",
+            help=f"Response of the gyro, which the design takes out: {RESPONSE_WORDS}.",
         ),
     ] = None
-    gyro_damping: Annotated[Positive | None, GYRO_DAMPING] = None
+    gyro_bandwidth_hz: Annotated[Positive | None, _old_option("--gyro-bandwidth-hz", "HZ")] = None
+    gyro_damping: Annotated[Positive | None, _old_option("--gyro-damping", "RATIO")] = None
 
     def radians(self) -> Fraction:
         """Return the band in rad a sample."""
-        from strapgen.catalogue.methods.window_conditions import PI
+        from strapgen.catalogue.methods.sensor_response import PI
 
         if self.band is not None:
             band = Fraction(self.band)
@@ -85,13 +105,17 @@ class BandOptions:
             )
         return band
 
-    def gyro(self) -> GyroResponse | None:
-        """Return the gyro; None if it is ideal."""
-        from strapgen.catalogue.methods.window import GyroResponse
-
-        if self.gyro_bandwidth_hz is None or self.gyro_damping is None or self.sample_hz is None:
+    def gyro(self) -> Response | None:
+        """Return the response of the gyro; None if it is ideal."""
+        words = self.response
+        if self.gyro_bandwidth_hz is not None and self.gyro_damping is not None:
+            words = f"second-order:{self.gyro_bandwidth_hz}:{self.gyro_damping}"
+            say_old(words)
+        if words is None or self.sample_hz is None:
             return None
-        return GyroResponse(self.gyro_bandwidth_hz, self.gyro_damping, self.sample_hz)
+        from strapgen.catalogue.methods.sensor_response import parse
+
+        return parse("--response", words).at(Fraction(self.sample_hz))
 
 
 _Text = str | None
@@ -163,47 +187,54 @@ class VibrationSource:
         ),
     ] = None
 
-    gyro_bandwidth_hz: Annotated[
-        tuple[Positive, ...] | None,
+    response: Annotated[
+        tuple[str, ...] | None,
         option(
-            "--gyro-bandwidth-hz",
-            metavar="HZ,...",
-            help="Natural frequency of a gyro of second order, through which the algorithm sees the angles; X,Y for "
-            "one about each axis.",
+            "--response",
+            metavar="FILE|WORDS,...",
+            help=f"Response of the gyro through which the algorithm sees the angles, X,Y for one about each axis: "
+            f"{RESPONSE_WORDS}.",
         ),
     ] = None
-    gyro_damping: Annotated[
-        tuple[Positive, ...] | None, option("--gyro-damping", metavar="RATIO,...", help=_DAMPING)
+    gyro_bandwidth_hz: Annotated[
+        tuple[Positive, ...] | None, _old_option("--gyro-bandwidth-hz", "HZ,...")
     ] = None
+    gyro_damping: Annotated[tuple[Positive, ...] | None, _old_option("--gyro-damping", "RATIO,...")] = None
 
-    def through_gyro(self, assessment: Assessment) -> Assessment:
-        """Return the assessment of an algorithm that sees the vibration through the gyro, if there is one."""
-        if self.gyro_bandwidth_hz is None or self.gyro_damping is None:
+    def through_gyro(self, assessment: Assessment, samples: int) -> Assessment:
+        """Return the assessment of an algorithm that sees the vibration through the gyro, if there is one.
+
+        `samples`: samples of a step.
+        """
+        if not self._responses:
             return assessment
         from strapgen.analysis import vibration
+        from strapgen.catalogue.methods.sensor_response import parse
 
-        frequencies = self._two("--gyro-bandwidth-hz", self.gyro_bandwidth_hz)
-        dampings = self._two("--gyro-damping", self.gyro_damping)
-        x, y = zip(frequencies, dampings, strict=True)
+        assert self.step is not None, "it is checked"
+        x, y = (parse("--response", one).at(Fraction(samples / self.step)) for one in self._responses)
         return vibration.through_gyros(assessment, x, y)
 
-    @staticmethod
-    def _two(name: str, numbers: tuple[Positive, ...]) -> tuple[Positive, ...]:
-        """Return the numbers of the gyros about x and y; one number is that of both."""
-        if len(numbers) > 2:
+    @cached_property
+    def _responses(self) -> tuple[str, ...]:
+        """The responses about x and y in words; one is that of both, and there may be none."""
+        several = self.response or ()
+        if self.gyro_bandwidth_hz is not None and self.gyro_damping is not None:
+            most = max(len(self.gyro_bandwidth_hz), len(self.gyro_damping))
+            numbers = (one * (most + 1 - len(one)) for one in (self.gyro_bandwidth_hz, self.gyro_damping))
+            several = tuple(f"second-order:{hertz}:{ratio}" for hertz, ratio in zip(*numbers, strict=False))
+        if len(several) > 2:
             raise InputError(
-                f"{name} is {written(numbers)!r}; one number or two with a comma between are needed"
+                f"--response is {written(several)!r}; one or two with a comma between are needed"
             )
-        return numbers * (3 - len(numbers))
+        if self.gyro_bandwidth_hz is not None:
+            say_old(written(several))
+        return several * (3 - len(several)) if several else ()
 
     @property
     def gyro_words(self) -> str:
         """The gyro for a reader; empty without one."""
-        if self.gyro_bandwidth_hz is None:
-            return ""
-        return (
-            f", through a gyro of {written(self.gyro_bandwidth_hz)} Hz, damping {written(self.gyro_damping)}"
-        )
+        return f", through {written(tuple(dict.fromkeys(self._responses)))}" if self._responses else ""
 
     def check(self) -> None:
         """Check that there is one frequency or a spectrum, with all that it needs."""
@@ -394,7 +425,7 @@ def _assess(algorithm: str, method: MethodOptions, source: VibrationSource) -> l
             raise InputError(f"{algorithm} takes no {name}")
         quantities = _quantities(algorithm, ("drift", "sculling"), source)
         return [
-            AssessedCase(source.through_gyro(assessment.two_speed(quantity)), cycles, cycles)
+            AssessedCase(source.through_gyro(assessment.two_speed(quantity), cycles), cycles, cycles)
             for quantity in quantities
         ]
     fast = None
@@ -405,7 +436,9 @@ def _assess(algorithm: str, method: MethodOptions, source: VibrationSource) -> l
     of = partial(assessment.of, choice)
     quantities = _quantities(algorithm, assessment.quantities(choice), source)
     samples = fast or choice.increments_per_step
-    return [AssessedCase(source.through_gyro(of(quantity)), fast, samples) for quantity in quantities]
+    return [
+        AssessedCase(source.through_gyro(of(quantity), samples), fast, samples) for quantity in quantities
+    ]
 
 
 def _cycles(algorithm: str, method: MethodOptions, loop: str) -> int:

@@ -8,7 +8,7 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Annotated, Generic, TypeVar
 
-from strapgen.catalogue.methods.window import GyroResponse
+from strapgen.catalogue.methods.sensor_response import Response
 from strapgen.catalogue.toml_models import Key
 from strapgen.ir.exceptions import InputError
 
@@ -29,7 +29,13 @@ Source = Annotated[str, Key("Where it comes from", pattern=r".*\S.*", form="a te
 Band = Annotated[
     Fraction, Key("Highest angular frequency; pi is half the sampling rate", "rad a sample", above=0, below=3)
 ]
-Gyro = Annotated[GyroResponse, Key("Gyro of second order whose response is compensated; ideal without it")]
+Gyro = Annotated[Response, Key("Response of the gyro, which is compensated; ideal without it")]
+
+
+def check_gyro(gyro: Response | None) -> None:
+    """Refuse a response without its sampling frequency."""
+    if gyro is not None and gyro.sample_hz is None:
+        raise InputError("gyro.sample_hz is missing; a number above 0 in Hz is needed")
 
 
 def slug(title: str) -> str:

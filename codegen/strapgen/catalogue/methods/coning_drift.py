@@ -17,8 +17,7 @@ from typing import Any, NamedTuple
 
 from mpmath.ctx_mp import MPContext
 
-from strapgen.catalogue.methods.window import GyroResponse
-from strapgen.catalogue.methods.window_conditions import PI
+from strapgen.catalogue.methods.sensor_response import PI, Response, product, quotient
 
 #: Numbers of 60 digits: E cancels to 1e-20 of its terms and less.
 _REAL = MPContext()
@@ -32,7 +31,7 @@ class ConingShape(NamedTuple):
 
     increments: int  # N, of the step
     previous: int  # samples from before the step
-    gyro: GyroResponse | None = None  # None for increments that are integrals of the rate
+    gyro: Response | None = None  # None for increments that are integrals of the rate
 
     @property
     def unknowns(self) -> int:
@@ -49,19 +48,23 @@ def terms(shape: ConingShape, b: Any, context: Any) -> tuple[list[Any], Any]:
     """
     power = context.mpf(1)
     if shape.gyro is not None:
-        constant, square, fourth = (
-            context.mpf(c.numerator) / c.denominator for c in _inverse_power(shape.gyro)
-        )
-        power = 1 / (constant + b * b * (square + b * b * fourth))
+        assert shape.gyro.sample_hz is not None, "a shape's has it"
+        hertz = shape.gyro.sample_hz / (2 * PI)
+        power = abs(shape.gyro.gain(b * hertz.numerator / hertz.denominator, context)) ** 2
     factor = 2 * power * (1 - context.cos(b))
     columns = [factor * context.sin(s * b) for s in range(1, shape.unknowns + 1)]
     return columns, (shape.increments * b - power * context.sin(shape.increments * b)) / 2
 
 
-def _inverse_power(gyro: GyroResponse) -> tuple[Fraction, Fraction, Fraction]:
-    """Return the coefficients of 1, b^2 and b^4 in 1/H."""
-    ratio = gyro.sample_hz / (2 * PI * gyro.bandwidth_hz)  # b times it is omega by the natural frequency
-    return Fraction(1), (4 * gyro.damping**2 - 2) * ratio**2, ratio**4
+def _inverse_power(gyro: Response | None, count: int) -> list[Fraction]:
+    """Return the coefficients of 1, b^2, b^4, ... in 1/H."""
+    if gyro is None:
+        return [Fraction(int(not k)) for k in range(count)]
+    ideal, own = (one.series(2 * count) for one in (Response(), gyro))
+    inverse = quotient(ideal, own)
+    mirrored = [c * (-1) ** k for k, c in enumerate(inverse)]
+    # b^2 is -(ib)^2.
+    return [c * (-1) ** k for k, c in enumerate(product(inverse, mirrored)[::2])]
 
 
 def powers(shape: ConingShape, count: int) -> list[tuple[list[Fraction], Fraction]]:
@@ -72,14 +75,12 @@ def powers(shape: ConingShape, count: int) -> list[tuple[list[Fraction], Fractio
     """
     from strapgen.catalogue.methods.coning_coefficients import power_of_coning
 
-    inverse = (Fraction(1),) if shape.gyro is None else _inverse_power(shape.gyro)
+    inverse = _inverse_power(shape.gyro, count + 1)
     conditions = []
     for q in range(1, count + 1):
         power, n = 2 * q + 1, Fraction(shape.increments)
         # The sum of K_s 2 sin(s b) (1 - cos b) is N b/(2 H) - sin(N b)/2.
-        right = -(n**power) / 2
-        if q < len(inverse):
-            right += n / 2 * (-1) ** q * factorial(power) * inverse[q]
+        right = -(n**power) / 2 + n / 2 * (-1) ** q * factorial(power) * inverse[q]
         conditions.append(([power_of_coning(s, power) for s in range(1, shape.unknowns + 1)], right))
     return conditions
 

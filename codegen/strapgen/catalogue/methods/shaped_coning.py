@@ -16,7 +16,7 @@ from typing import Annotated, Any, ClassVar
 from strapgen.catalogue.methods import coefficient_files
 from strapgen.catalogue.methods.coefficient_files import Band, CoefficientFiles, Gyro, Source, Title
 from strapgen.catalogue.methods.method_spec import RequestedSamples, StepSamples
-from strapgen.catalogue.methods.window import GyroResponse
+from strapgen.catalogue.methods.sensor_response import Response
 from strapgen.catalogue.methods.windows import WINDOWS
 from strapgen.catalogue.toml_models import Key, UserFile
 from strapgen.ir import checks
@@ -62,7 +62,7 @@ class ShapedConing:
         Highest total degree of products of two powers of time in the rate for which a step is exact; 0 for none.
     band : Fraction or None
         Highest angular frequency in rad a sample for which they are designed; None if that is a spectrum.
-    gyro : GyroResponse or None
+    gyro : Response or None
         The gyro through which the motion is seen; None for increments that are integrals of the rate.
     level : Decimal or None
         Largest drift over the band in rad a step, for each squared radian of the half-angle.
@@ -86,7 +86,7 @@ class ShapedConing:
     powers: int = 0
     products: int = 0
     band: Fraction | None = None
-    gyro: GyroResponse | None = None
+    gyro: Response | None = None
     level: Decimal | None = None
     file: str = field(default="", compare=False, repr=False)
 
@@ -164,6 +164,7 @@ class ShapeFile:
     gyro: Gyro | None = None
 
     def __post_init__(self) -> None:
+        coefficient_files.check_gyro(self.gyro)
         count = self.samples + self.previous - 1
         if len(self.coefficients) != count:
             raise InputError(

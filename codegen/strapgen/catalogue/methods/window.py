@@ -5,10 +5,10 @@ from __future__ import annotations
 import shlex
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
-from typing import Annotated, Any, ClassVar
+from typing import Any, ClassVar
 
 from strapgen.catalogue.methods.method_spec import RequestedSamples, StepSamples
-from strapgen.catalogue.toml_models import Key
+from strapgen.catalogue.methods.sensor_response import Response
 from strapgen.ir import checks
 from strapgen.ir.checks import counted
 from strapgen.ir.exceptions import InputError
@@ -17,15 +17,6 @@ from strapgen.ir.renamed import renamed
 
 #: A filter: a weight for each sample of the window, the oldest first.
 Taps = tuple[Fraction, ...]
-
-
-@dataclass(frozen=True)
-class GyroResponse:
-    """A gyro of second order, whose transfer function is 1/(1 + 2 zeta s/w + s^2/w^2)."""
-
-    bandwidth_hz: Annotated[Fraction, Key("Natural frequency w/(2 pi)", "Hz", above=0)]
-    damping: Annotated[Fraction, Key("Damping ratio zeta", "1", above=0)]
-    sample_hz: Annotated[Fraction, Key("Sampling frequency", "Hz", above=0)]
 
 
 @renamed(samples="total_increments")
@@ -50,8 +41,9 @@ class Window:
         "minimax" or "mean square".
     filters : tuple of tuple of Fraction, (M + 1, p + N + L)
         Weights of the samples, the oldest first; for an ideal gyro row 0 is the sum of the samples of the step.
-    gyro : GyroResponse or None
-        The gyro whose response the filters take out; None for increments that are integrals of the rate.
+    gyro : Response or None
+        The response that the filters take out, with its sampling frequency; None where increments are integrals of
+        the rate.
     noise : Fraction
         Standard deviation of the noise of an increment, by that of the rate times the sampling interval; 0 for none.
     rotation : str
@@ -94,7 +86,7 @@ class Window:
     band: Fraction
     objective: str
     filters: tuple[Taps, ...]
-    gyro: GyroResponse | None = None
+    gyro: Response | None = None
     noise: Fraction = Fraction(0)
     rotation: str = "fourth"
     terms: int = 16

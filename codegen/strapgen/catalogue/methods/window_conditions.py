@@ -10,16 +10,12 @@ from collections.abc import Sequence
 from fractions import Fraction
 from math import comb, factorial
 
-from strapgen.catalogue.methods.window import GyroResponse, Taps, Window
+from strapgen.catalogue.methods.sensor_response import Response
+from strapgen.catalogue.methods.window import Taps, Window
 from strapgen.ir.exceptions import InputError
 
-#: A rational that rounds to pi in double precision; with it the conditions of a gyro are rational.
-PI = Fraction(245850922, 78256779)
 
-
-def increments(
-    samples: tuple[int, int, int], conditions: int, gyro: GyroResponse | None = None
-) -> list[Taps]:
+def increments(samples: tuple[int, int, int], conditions: int, gyro: Response | None = None) -> list[Taps]:
     """Return E: for each power k below `conditions` the increments, oldest first, of the rate u^k times the step.
 
     The samples are N in the step, p before it and L ahead of it; without a gyro increments are integrals of the rate.
@@ -28,19 +24,16 @@ def increments(
     [(Fraction(1, 1), Fraction(1, 1), Fraction(1, 1)), (Fraction(-1, 1), Fraction(0, 1), Fraction(1, 1))]
     """
     number, previous, ahead = samples
-    series = gyro_series(gyro, conditions) if gyro else [Fraction(1)]
-    half = Fraction(number, 2)
-    ends = [Fraction(j) - half for j in range(-previous, number + ahead + 1)]
+    series = (gyro or Response()).series(conditions)
+    middles = [Fraction(2 * j + 1 - number, 2) for j in range(-previous, number + ahead)]
     # (s T)^i turns t^k, t in samples, into k!/(k-i)! t^(k-i).
     derivatives = [
-        [series[i] * factorial(k) / factorial(k - i) for i in range(min(k + 1, len(series)))]
-        for k in range(conditions)
+        [series[i] * factorial(k) / factorial(k - i) for i in range(k + 1)] for k in range(conditions)
     ]
     return [
         tuple(
-            sum((g * _integral(k - i, low, low + 1) for i, g in enumerate(row)), Fraction(0))
-            / number ** (k + 1)
-            for low in ends[:-1]
+            sum((g * t ** (k - i) for i, g in enumerate(row)), Fraction(0)) / number ** (k + 1)
+            for t in middles
         )
         for k, row in enumerate(derivatives)
     ]
@@ -64,20 +57,6 @@ def coefficients(m: int, conditions: int) -> Taps:
         (2 * m + 1) * sum((c * _integral(k + i, -half, half) for i, c in enumerate(legendre)), Fraction(0))
         for k in range(conditions)
     )
-
-
-def gyro_series(gyro: GyroResponse, terms: int) -> list[Fraction]:
-    """Return the gyro's transfer function as a power series in s T, T the sampling interval.
-
-    >>> series = gyro_series(GyroResponse(Fraction(40), Fraction(7071, 10000), Fraction(100)), 3)
-    >>> [round(float(g), 4) for g in series]
-    [1.0, -0.5627, 0.1583]
-    """
-    inverse = gyro.sample_hz / (2 * PI * gyro.bandwidth_hz)  # 1/(w T)
-    series = [Fraction(1), -2 * gyro.damping * inverse]
-    while len(series) < terms:
-        series.append(-2 * gyro.damping * inverse * series[-1] - inverse**2 * series[-2])
-    return series[:terms]
 
 
 def first_failure(window: Window) -> tuple[int, int, Fraction, Fraction] | None:

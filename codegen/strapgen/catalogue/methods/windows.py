@@ -126,6 +126,7 @@ class WindowFile:
     ] = "legendre"
 
     def __post_init__(self) -> None:
+        coefficient_files.check_gyro(self.gyro)
         if self.form == "pair":
             _check_pair(self)
         samples = self.previous + self.increments + self.ahead

@@ -117,9 +117,8 @@ def family(window: str | Window, sample_hz: float | str | Fraction | None = None
     rate = None if sample_hz is None else checks.number("sample_hz", sample_hz, positive=True)
     if chosen.gyro is not None and rate != chosen.gyro.sample_hz:
         stated = "no sampling rate is stated" if rate is None else f"the sampling rate is {float(rate):g} Hz"
-        raise InputError(
-            f"{stated}; {chosen.name} is designed for a gyro at {float(chosen.gyro.sample_hz):g} Hz, which is needed"
-        )
+        needed = f"{float(chosen.gyro.sample_hz or 0):g} Hz"
+        raise InputError(f"{stated}; {chosen.name} is designed for a gyro at {needed}, which is needed")
     return LateFilters(chosen)
 
 

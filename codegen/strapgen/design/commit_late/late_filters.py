@@ -22,7 +22,8 @@ from mpmath.ctx_mp import MPContext
 
 from strapgen.catalogue.kernels.kernel_names import EXACT_DEGREES, LEGENDRE_DEGREES
 from strapgen.catalogue.methods import window_conditions
-from strapgen.catalogue.methods.window import GyroResponse, Taps, Window
+from strapgen.catalogue.methods.sensor_response import PI, Response
+from strapgen.catalogue.methods.window import Taps, Window
 from strapgen.catalogue.methods.windows import EXACT_TERMS
 from strapgen.ir.exceptions import InputError
 
@@ -195,7 +196,7 @@ def restoration(window: Window) -> Restoration:
 
 
 @lru_cache(maxsize=8)
-def _restoration(band: Fraction, gyro: GyroResponse | None) -> Restoration:
+def _restoration(band: Fraction, gyro: Response | None) -> Restoration:
     points = [
         _number(band) * _REAL.cos(_REAL.pi * (2 * k + 1) / (4 * POINTS)) for k in range(POINTS)
     ]  # b = band cos(pi (k + 1/2) / 800)
@@ -233,13 +234,13 @@ def _taps(lags: Sequence[Any], groups: Sequence[tuple[int, ...]]) -> Taps:
     return tuple(by_sample.get(j, Fraction(0)) for j in range(-REACH, REACH + 1))
 
 
-def _square(b: Any, gyro: GyroResponse | None) -> Any:
+def _square(b: Any, gyro: Response | None) -> Any:
     """Return |A_0|^2 at an angular frequency in rad a sample."""
     square = (_REAL.sin(b / 2) / (b / 2)) ** 2
     if gyro is None:
         return square
-    ratio = b * _number(gyro.sample_hz) / (2 * _REAL.pi * _number(gyro.bandwidth_hz))
-    return square / ((1 - ratio**2) ** 2 + (2 * _number(gyro.damping) * ratio) ** 2)
+    assert gyro.sample_hz is not None, "a window's has it"
+    return square * abs(gyro.gain(b * _number(gyro.sample_hz / (2 * PI)), _REAL)) ** 2
 
 
 def _number(value: Fraction) -> Any:

@@ -18,8 +18,7 @@ from typing import Any
 from mpmath.ctx_mp import MPContext
 from mpmath.libmp import mpf_shift, round_nearest, to_int
 
-from strapgen.catalogue.methods.window import GyroResponse
-from strapgen.catalogue.methods.window_conditions import PI
+from strapgen.catalogue.methods.sensor_response import PI, Response
 
 #: Binary digits behind the point of the integers, and the number 1 in them.
 BITS = 320
@@ -55,7 +54,7 @@ class BandGrid:
     """
 
     def __init__(
-        self, points: Sequence[Any], reach: int, gyro: GyroResponse | None = None, increments: int = 1
+        self, points: Sequence[Any], reach: int, gyro: Response | None = None, increments: int = 1
     ) -> None:
         self.points, self._increments = points, increments
         #: cos(jb) and sin(jb) for j from 0 to the reach, by frequency; from 1/2 on for even N.
@@ -153,15 +152,13 @@ def _recurrence(first: int, second: int, cosine: int, reach: int) -> list[int]:
     return values[: reach + 1]
 
 
-def _gain(b: Any, gyro: GyroResponse | None) -> tuple[int, int]:
+def _gain(b: Any, gyro: Response | None) -> tuple[int, int]:
     sinc = _bessel_integer(0, integer(b) // 2)
     if gyro is None:
         return sinc, 0
-    # x = i omega/w, so that 1 + 2 zeta x + x^2 = 1 - (omega/w)^2 + 2 i zeta omega/w.
-    ratio = gyro.sample_hz / (2 * PI * gyro.bandwidth_hz)
-    x = b * ratio.numerator / ratio.denominator
-    damping = REAL.mpf(gyro.damping.numerator) / gyro.damping.denominator
-    response = real(sinc) / REAL.mpc(1 - x * x, 2 * damping * x)
+    assert gyro.sample_hz is not None, "a window's has it"
+    hertz = gyro.sample_hz / (2 * PI)
+    response = REAL.mpc(real(sinc) * gyro.gain(b * hertz.numerator / hertz.denominator, REAL))
     return integer(response.real), integer(response.imag)
 
 
@@ -221,14 +218,14 @@ def search_points(band: Fraction, count: int = SEARCH_POINTS) -> list[Any]:
 
 
 @lru_cache(maxsize=8)
-def mean_grid(band: Fraction, reach: int, gyro: GyroResponse | None, increments: int = 1) -> BandGrid:
+def mean_grid(band: Fraction, reach: int, gyro: Response | None, increments: int = 1) -> BandGrid:
     """Return the grid of a mean over a band."""
     return BandGrid(mean_points(band), reach, gyro, increments)
 
 
 @lru_cache(maxsize=8)
 def search_grid(
-    band: Fraction, reach: int, gyro: GyroResponse | None, count: int = SEARCH_POINTS, increments: int = 1
+    band: Fraction, reach: int, gyro: Response | None, count: int = SEARCH_POINTS, increments: int = 1
 ) -> BandGrid:
     """Return the grid of a search for a largest error over a band."""
     return BandGrid(search_points(band, count), reach, gyro, increments)

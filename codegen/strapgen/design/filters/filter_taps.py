@@ -21,7 +21,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from strapgen.catalogue.methods import window_conditions
-from strapgen.catalogue.methods.window import GyroResponse, Taps, Window
+from strapgen.catalogue.methods.sensor_response import Response
+from strapgen.catalogue.methods.window import Taps, Window
 from strapgen.design.filters.band_grid import ONE, REAL, distance, integer, search_grid
 from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError
@@ -34,7 +35,7 @@ class Shape:
     previous: int
     ahead: int
     conditions: int
-    gyro: GyroResponse | None = None
+    gyro: Response | None = None
     increments: int = 1
 
     @property

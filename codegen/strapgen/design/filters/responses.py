@@ -78,8 +78,7 @@ def largest_gain(window: Window) -> float:
     response = np.exp(1j * np.outer(b, places)) @ np.array([float(tap) for tap in window.filters[0]])
     response = response * np.sinc(b / (2 * np.pi))
     if window.gyro is not None:
-        x = b * float(window.gyro.sample_hz / window.gyro.bandwidth_hz) / (2 * np.pi)
-        response = response / (1 - x * x + 2j * float(window.gyro.damping) * x)
+        response = response * window.gyro.gain(b * float(window.gyro.sample_hz or 0) / (2 * np.pi))
     return float(np.abs(response).max()) / window.increments
 
 

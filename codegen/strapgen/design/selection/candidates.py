@@ -5,6 +5,7 @@ They are the methods of the catalogue, coefficients designed for the vibration, 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from fractions import Fraction
 from functools import lru_cache
@@ -18,10 +19,11 @@ from strapgen.analysis.vibration import assessment
 from strapgen.analysis.vibration.rectification import Rectification, rectified
 from strapgen.catalogue import METHODS, Choice
 from strapgen.catalogue.methods.shaped_coning import ShapedConing
-from strapgen.catalogue.methods.window import GyroResponse
-from strapgen.design import coning_design
-from strapgen.design.brief import DesignBrief, SpectralEnvironment, read_brief
+from strapgen.design import coning_design, family
+from strapgen.design.brief import DesignBrief, LineEnvironment, SpectralEnvironment, read_brief
 from strapgen.design.coning_design import ConingBrief, of_spectrum
+from strapgen.design.family import FamilyBrief
+from strapgen.design.filters import responses
 from strapgen.design.frontier import Candidate
 from strapgen.design.selection import causes
 from strapgen.design.selection.causes import Rounding
@@ -198,17 +200,27 @@ _CYCLES = (2, 4, 8, 16)
 #: Objectives and samples of coefficients that are designed for a spectrum: see `coning_design.design`.
 _OBJECTIVES = ("worst", "random")
 _DESIGNED = ((4, 0), (1, 3), (3, 3), (1, 8))
-#: What the name of a method begins with whose coefficients are designed for the brief.
+#: What the name of a method begins with that is designed for the brief.
 TUNED = "tuned-"
+#: Forms of filters that are designed, and the samples of each.
+FORMS = ("window", "pair")
+_FILTERS = {"window": ((1, 5, 5), (1, 7, 7), (1, 9, 9)), "pair": ((1, 8, 8), (2, 7, 7))}
+#: The band by the highest frequency of the vibration, the widest one, and that up to which filters are exact on cubics.
+_MARGIN, _WIDEST, _NARROW = 1.05, Fraction(5, 2), Fraction(3, 2)
+#: Least noise by the rate: what is below rounds the solution of the equations.
+_LEAST_NOISE = Fraction(1, 10**9)
 
 
 def choice_of(candidate: Candidate, state: str, path: str) -> Choice:
     """Return the choice of a step, one that is integrated with a state of `STATES`.
 
-    The method is one of the catalogue; or "tuned-worst" or "tuned-random", whose coefficients a design for the
-    vibration of the brief at a path gives.
+    The method is one of the catalogue; or one that a design for the brief at a path gives: coefficients for its
+    vibration, "tuned-worst" or "tuned-random", or filters for its band and gyro, "tuned-window" or "tuned-pair".
     """
     method = candidate.method
+    if is_tuned_window(method):
+        window = family.commit_filters(window_brief(read_brief(Path(path)), candidate))
+        return catalogue.choose_step(state, window, candidate.increments)
     if method.startswith(TUNED):
         shape = design_coefficients(
             path, method.removeprefix(TUNED), candidate.increments, candidate.previous
@@ -222,7 +234,8 @@ def choice_of(candidate: Candidate, state: str, path: str) -> Choice:
 def contenders(brief: DesignBrief, names: Iterable[str] | None = None) -> list[Candidate]:
     """Return the algorithms for a brief; of two speeds the increments are the fast cycles in a slow one.
 
-    Coefficients are designed where the vibration has a spectrum that turns about two axes.
+    Coefficients are designed where the vibration has a spectrum that turns about two axes, and filters where it has a
+    band: windows, and pairs for a gyro whose samples are integrals of the rate.
 
     >>> from fractions import Fraction
     >>> from strapgen.design.brief import BudgetBrief, GyroBrief, ProcessorBrief
@@ -242,6 +255,9 @@ def contenders(brief: DesignBrief, names: Iterable[str] | None = None) -> list[C
         several += [
             Candidate(f"{TUNED}{objective}", *samples) for objective in _OBJECTIVES for samples in _DESIGNED
         ]
+    if _band(brief) is not None:
+        forms = FORMS if brief.gyro.seen is None else FORMS[:1]
+        several += [Candidate(f"{TUNED}{form}", *samples) for form in forms for samples in _FILTERS[form]]
     if names is None:
         return several
     chosen: dict[Candidate, None] = {}
@@ -268,16 +284,58 @@ def _has_coning(environment: SpectralEnvironment) -> bool:
     return {"angle_x", "angle_y"} <= set(environment.spectrum.transfers)
 
 
+def is_tuned_window(method: str) -> bool:
+    """Return whether a method has filters that are designed for the brief.
+
+    >>> is_tuned_window("tuned-pair"), is_tuned_window("tuned-worst"), is_tuned_window("window-7-7")
+    (True, False, False)
+    """
+    return method.startswith(TUNED) and method.removeprefix(TUNED) in FORMS
+
+
+def _band(brief: DesignBrief) -> Fraction | None:
+    """Return the angular frequency in rad a sample up to which there is vibration; None without one, or too high."""
+    environment = brief.environment
+    if not isinstance(environment, LineEnvironment | SpectralEnvironment):
+        return None
+    band = Fraction(
+        _MARGIN * 2 * math.pi * environment.highest_hz / float(brief.gyro.sample_hz)
+    ).limit_denominator(1000)
+    return band if band < _WIDEST else None
+
+
+def window_brief(brief: DesignBrief, candidate: Candidate) -> FamilyBrief:
+    """Return the requirements on the filters for the band, the spectrum, the noise and the gyro of a brief."""
+    band, environment = _band(brief), brief.environment
+    assert band is not None, "only these are tuned for"
+    spectrum = None
+    if isinstance(environment, SpectralEnvironment) and _has_coning(environment):
+        spectrum = responses.weights(environment.spectrum, band, brief.gyro.sample_hz)
+    taps = None
+    if candidate.method == f"{TUNED}{FORMS[1]}":
+        number = candidate.previous + candidate.increments // 2
+        taps = number, number - 3 + candidate.increments
+    noise = max(brief.gyro.noise_ratio(brief.max_rate_deg_s), _LEAST_NOISE)
+    return FamilyBrief(
+        candidate.previous,
+        candidate.ahead,
+        band,
+        conditions=4 if band <= _NARROW else 2,
+        gyro=brief.gyro.seen,
+        noise=noise,
+        spectrum=spectrum,
+        increments=candidate.increments,
+        taps=taps,
+    )
+
+
 @lru_cache(maxsize=16)
 def design_coefficients(path: str, objective: str, samples: int, previous: int) -> ShapedConing:
     """Return the coefficients that are designed for the spectrum of a brief and for its gyro."""
     brief = read_brief(Path(path))
     assert isinstance(brief.environment, SpectralEnvironment), "only these are tuned for"
-    gyro = None
-    if brief.gyro.bandwidth_hz is not None and brief.gyro.damping is not None:
-        gyro = GyroResponse(brief.gyro.bandwidth_hz, brief.gyro.damping, brief.gyro.sample_hz)
     lines = of_spectrum(brief.environment.spectrum, brief.gyro.sample_hz)
-    return coning_design.design(ConingBrief(samples, previous, objective, lines=lines, gyro=gyro))
+    return coning_design.design(ConingBrief(samples, previous, objective, lines=lines, gyro=brief.gyro.seen))
 
 
 def algorithm_of(candidate: Candidate, state: str, brief: DesignBrief, path: str | Path) -> Algorithm:

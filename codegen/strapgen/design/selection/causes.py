@@ -136,9 +136,7 @@ def tones(brief: DesignBrief) -> list[Tone]:
 
 def _through_gyro(assessed: Assessment, brief: DesignBrief) -> Assessment:
     """Return an assessment through the gyro of a brief."""
-    if brief.gyro.bandwidth_hz is None or brief.gyro.damping is None:
-        return assessed
-    return through_gyro(assessed, brief.gyro.bandwidth_hz, brief.gyro.damping)
+    return assessed if brief.gyro.seen is None else through_gyro(assessed, brief.gyro.seen)
 
 
 def quantization(choice: Choice, brief: DesignBrief) -> float:

@@ -7,6 +7,7 @@ import math
 import shutil
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
+from fractions import Fraction
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -16,7 +17,13 @@ from strapgen.analysis.vibration.rectification import DEGREE, Rectification
 from strapgen.design.brief import DesignBrief, files_of, read_brief
 from strapgen.design.frontier import Candidate
 from strapgen.design.selection import causes
-from strapgen.design.selection.candidates import STATES, Algorithm, algorithm_of
+from strapgen.design.selection.candidates import (
+    STATES,
+    Algorithm,
+    AttitudeStep,
+    algorithm_of,
+    is_tuned_window,
+)
 from strapgen.design.selection.causes import Rounding
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.version import VERSION
@@ -228,7 +235,7 @@ def judge(
         figures.get("position"),
         figures.get("instructions_per_s"),
         figures.get("bytes"),
-        _cancellation(findings, once(known, algorithm.line_errors)) if binding is None else "",
+        _fragility(findings, candidate, algorithm, known) if binding is None else "",
         coning_parts_deg_h=findings.coning_parts,
     )
 
@@ -244,6 +251,25 @@ def after_run(brief: DesignBrief, one: Judgement, run_deg_h: dict[str, float]) -
     return replace(one, meets=False, binding=binding, reason=reason, run_deg_h=run_deg_h)
 
 
+#: By what the response of a gyro may be off without notice.
+_OFF = Fraction(1, 100)
+
+
+def _fragility(findings: _Findings, candidate: Candidate, algorithm: Algorithm, known: dict[str, Any]) -> str:
+    """Return in words why a limit is met for this vibration and this gyro alone; empty where it is not."""
+    gyro = findings.brief.gyro
+    if gyro.seen is None or not (is_tuned_window(candidate.method) and isinstance(algorithm, AttitudeStep)):
+        return _cancellation(findings, once(known, algorithm.line_errors))
+    other = replace(findings.brief, gyro=replace(gyro, response=gyro.seen.stretched(1 + _OFF)))
+    drift = causes.coning(algorithm.choice, other)
+    if drift <= findings.software_limit:
+        return ""
+    return (
+        f"the filters take out the response of this gyro, and one of {float(_OFF):.0%} higher frequencies leaves "
+        f"{drift:.2g} deg/h"
+    )
+
+
 def _cancellation(findings: _Findings, errors: list[float]) -> str:
     """Return in words how errors of lines cancel; empty where the limit is met without cancellation."""
     largest = math.fsum(map(abs, errors))
@@ -252,7 +278,7 @@ def _cancellation(findings: _Findings, errors: list[float]) -> str:
     return (
         f"errors of up to {max(map(abs, errors)):.2g} deg/h, of the algorithm and of the gyro at "
         f"{len(errors) // 2} line{'s' if len(errors) > 2 else ''}, cancel to "
-        f"{findings.drift['coning'] or 0.0:.2g} deg/h"
+        f"{findings.drift['coning'] or 0.0:.2g} deg/h; other frequencies or a changed gyro undo it"
     )
 
 
@@ -336,9 +362,7 @@ def verdicts(brief: DesignBrief, ordered: list[Judgement]) -> list[str]:
                 f"its run in time confirms it: {best.run_deg_h['truncation']:.2g} deg/h in the turn{coning}"
             )
         if best.fragile:
-            sentences.append(
-                f"the choice is fragile: {best.fragile}; other frequencies or a changed gyro undo it"
-            )
+            sentences.append(f"the choice is fragile: {best.fragile}")
     else:
         counts: dict[str, int] = {}
         for one in ordered:

@@ -8,10 +8,12 @@ from typing import Any, ClassVar
 
 from strapgen import pipeline, registration
 from strapgen.catalogue.methods.shaped_coning import ShapedConing
-from strapgen.design import coning_design
+from strapgen.catalogue.methods.window import Window
+from strapgen.design import coning_design, family
 from strapgen.design.brief import DesignBrief
+from strapgen.design.frontier import Candidate
 from strapgen.design.selection import causes
-from strapgen.design.selection.candidates import TUNED, Algorithm, AttitudeStep
+from strapgen.design.selection.candidates import TUNED, Algorithm, AttitudeStep, is_tuned_window, window_brief
 from strapgen.design.selection.judgement import CAUSES, Judgement, verdicts
 from strapgen.design.selection.simulated import RANDOM_RUNS, RandomDrift, Simulated
 from strapgen.results.records import entry, keyed_table
@@ -172,10 +174,14 @@ def firmware_files(
         return files | {SYSTEM: described.file(), REPORT: report}
     choice = algorithm.choice
     settings = causes.settings(choice, brief, judgement.carry)
-    if judgement.method.startswith(TUNED) and isinstance(choice.method, ShapedConing):
+    if judgement.method.startswith(TUNED) and isinstance(choice.method, ShapedConing | Window):
         choice = replace(choice, method=replace(choice.method, file=COEFFICIENTS))
     files = dict(pipeline.compile(choice, "c-fixed", settings).step_files)
     files |= registration.extension("generate.project", "--out").project_files(choice, "c-fixed", settings)
     if judgement.method.startswith(TUNED) and isinstance(choice.method, ShapedConing):
         files[COEFFICIENTS] = coning_design.written(choice.method, command)
+    if is_tuned_window(judgement.method):
+        samples = judgement.increments, judgement.previous, judgement.ahead
+        wanted = window_brief(brief, Candidate(judgement.method, *samples))
+        files[COEFFICIENTS] = family.written(family.design(wanted), command)
     return files | {REPORT: report}

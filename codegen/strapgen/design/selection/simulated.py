@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import lru_cache
 from pathlib import Path
@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from strapgen.catalogue.methods.sensor_response import Response
 from strapgen.design.brief import DesignBrief, GyroBrief, Line
 from strapgen.design.frontier import Candidate
 from strapgen.design.selection import causes
@@ -107,9 +108,7 @@ def _vibration(lines: tuple[Line, ...], gyro: GyroBrief) -> Vibration:
     phases = start_phases(len(lines)) + np.array([still, [line.phase for line in lines], still])
     # The angle X sin(wt) has the rate X w cos(wt).
     rates = CosineSum(np.array([*sizes, still]) * omega, np.tile(omega, (_AXES, 1)), phases)
-    gain = gyro.gain(hertz)
-    measured = replace(rates, amplitudes=rates.amplitudes * np.abs(gain), phases=phases + np.angle(gain))
-    return Vibration(rates=rates, measured=measured)
+    return Vibration(rates=rates, measured=rates.through_gyro(gyro.seen or Response()))
 
 
 def start_phases(count: int) -> NDArray[np.float64]:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from fractions import Fraction
 from functools import lru_cache
 from typing import Any, Protocol, runtime_checkable
 
@@ -16,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from strapgen import catalogue
+from strapgen.catalogue.methods.sensor_response import Response
 from strapgen.ir.exceptions import InputError
 from strapgen.run.backends import Backend, backend
 
@@ -107,21 +109,11 @@ class CosineSum:
         total[..., moving] = sums
         return total
 
-    def through_gyro(self, bandwidth: float) -> CosineSum:
-        """Return the sum with what a gyro of a bandwidth in Hz measures of it, a Butterworth filter of second order."""
-        return replace(self, measured=self.filtered(2 * math.pi * bandwidth))
-
-    def filtered(self, cutoff: float) -> CosineSum:
-        """Return the sum as a Butterworth filter of second order passes it on, long after it began.
-
-        `cutoff`: frequency in rad/s at which half of the power is lost: the filter is 1/(1 + sqrt(2) s/w +
-        (s/w)^2).
-        """
-        s = 1j * self.frequencies / cutoff
-        response = 1 / (1 + math.sqrt(2) * s + s * s)
-        return CosineSum(
-            self.amplitudes * np.abs(response), self.frequencies, self.phases + np.angle(response)
-        )
+    def through_gyro(self, response: Response) -> CosineSum:
+        """Return the sum with what a gyro measures of it, long after it began."""
+        gain = response.gain(self.frequencies / (2 * np.pi))
+        measured = CosineSum(self.amplitudes * np.abs(gain), self.frequencies, self.phases + np.angle(gain))
+        return replace(self, measured=measured)
 
 
 @dataclass(frozen=True)
@@ -202,7 +194,9 @@ def vibration_rate(angle: float, gyro: float) -> CosineSum:
     phases = 2 * np.pi * _fractions(_PHASE_ROOTS, np.arange(1, _LINES.size + 1))
     phases[1] = phases[0] - np.pi / 2
     motion = CosineSum(frequencies * (angle * math.sqrt(2 / _LINES.size)), frequencies, phases)
-    return motion.through_gyro(gyro) if gyro < math.inf else motion
+    if gyro == math.inf:
+        return motion
+    return motion.through_gyro(Response("butterworth", order=2, frequency_hz=Fraction(gyro)))
 
 
 def slew(onset: float, rate: float) -> _Slews:

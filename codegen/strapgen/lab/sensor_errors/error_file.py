@@ -12,9 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from strapgen.catalogue import toml_models
+from strapgen.catalogue.methods.sensor_response import Response, parse
 from strapgen.catalogue.toml_models import Key, UserFile
 from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError
+from strapgen.ir.renamed import warn
 from strapgen.ir.units import STANDARD_GRAVITY
 from strapgen.lab.sensor_errors.instruments import (
     Heating,
@@ -24,6 +26,7 @@ from strapgen.lab.sensor_errors.instruments import (
     TriadErrors,
     WarmUp,
     dithered_laser_noise,
+    second_order,
 )
 
 Array = NDArray[np.float64]
@@ -72,9 +75,15 @@ class TriadFile:
 
     bandwidth_hz: Annotated[
         Vector | None,
-        _of("Natural frequency of the response, of second order", "Hz", "bandwidth_hz", 1e-3, 1e6),
+        _of("Old: natural frequency of a response of second order", "Hz", "bandwidth_hz", 1e-3, 1e6),
     ] = None
-    damping: Annotated[Vector | None, _of("Damping ratio of the response", "1", "damping", 1e-2, 1e2)] = None
+    damping: Annotated[Vector | None, _of("Old: its damping ratio", "1", "damping", 1e-2, 1e2)] = None
+    response: Annotated[
+        str | Response | tuple[str, str, str] | None,
+        Key(
+            "Response, or that of each axis: a table, or as --response, a CSV file by its path from the folder"
+        ),
+    ] = None
     delay: Annotated[Vector | None, _of("Delay", "s", "delay_s", 0, 10)] = None
     scale: Annotated[Vector | None, _of("Error of the scale factor", "ppm", "scale_ppm", -5e5, 5e5)] = None
     scale_plus: Annotated[
@@ -95,17 +104,27 @@ class TriadFile:
     ] = None
 
     def __post_init__(self) -> None:
+        if self.response is not None and self.bandwidth_hz is not None:
+            raise InputError("bandwidth_hz and response are both there; response is needed")
         for name in ("scale_plus", "scale_minus"):
             if self.scale is not None and getattr(self, name) is not None:
                 raise InputError(f"scale_ppm and {name}_ppm are both there; one of them is needed")
 
-    def changed(self, triad: TriadErrors) -> TriadErrors:
-        """Return errors with those that are stated in their place."""
+    def changed(self, triad: TriadErrors, folder: Path) -> TriadErrors:
+        """Return errors with those that are stated in their place; the file of a response is in a folder."""
         changes: dict[str, Any] = {}
+        if self.bandwidth_hz is not None:
+            warn("bandwidth_hz", "response")
+            changes["response"] = second_order(self.bandwidth_hz, self.damping)
+        elif self.response is not None:
+            several = self.response if isinstance(self.response, tuple) else (self.response,) * 3
+            changes["response"] = tuple(
+                parse("response", one, folder) if isinstance(one, str) else one for one in several
+            )
         terms = dict(triad.terms)
         for name, key in toml_models.keys(type(self)).items():
             value, factor = getattr(self, name), _SI.get(key.unit, 1.0)
-            if value is None or name == "dither":
+            if value is None or name in ("dither", "response", "bandwidth_hz", "damping"):
                 continue
             if key.names:
                 elements = value if isinstance(value, Mapping) else dict.fromkeys(key.names, value)
@@ -160,9 +179,9 @@ class GyroFile(TriadFile):
         if self.noise is not None and self.dither is not None:
             raise InputError("noise_deg_sqrt_h and dither are both there; one of them is needed")
 
-    def changed(self, triad: TriadErrors) -> TriadErrors:
+    def changed(self, triad: TriadErrors, folder: Path) -> TriadErrors:
         """Return errors with those that are stated in their place."""
-        triad = super().changed(triad)
+        triad = super().changed(triad, folder)
         if self.dither is None:
             return triad
         numbers = self.dither.lock_in_deg_s, self.dither.dither_deg_s, self.dither.fringes
@@ -261,16 +280,16 @@ class ErrorFile:
     heating: Annotated[HeatingFile | None, Key("Heating of the torquers")] = None
     output_noise: Annotated[OutputNoiseFile | None, Key("Noise of an output whose sum stays bounded")] = None
 
-    def errors(self) -> InstrumentErrors:
-        """Return the errors in SI units."""
+    def errors(self, folder: Path = Path()) -> InstrumentErrors:
+        """Return the errors in SI units; the file of a response is in a folder."""
         errors = InstrumentErrors() if self.base is None else read(self.base)
         warm, heat, noise = self.warm_up, self.heating, self.output_noise
         parts = {
             "title": self.title,
             "seed": self.seed,
             "drawn": None if self.constants is None else self.constants == "drawn",
-            "gyro": self.gyro.changed(errors.gyro),
-            "accelerometer": self.accelerometer.changed(errors.accelerometer),
+            "gyro": self.gyro.changed(errors.gyro, folder),
+            "accelerometer": self.accelerometer.changed(errors.accelerometer, folder),
             "sampling": self.sampling,
             "warm_up": warm and WarmUp(_vector(warm.rate_deg_h) * _DEG_H, _vector(warm.tau_s)),
             "heating": heat
@@ -286,6 +305,11 @@ def _vector(value: Vector) -> Array:
 
 
 ERRORS = UserFile("a file of sensor errors", ErrorFile, 1 << 16)
+
+
+def path_of(source: str | Path) -> Path:
+    """Return the file of sensor errors, or of a class."""
+    return _FOLDER / f"{source}.toml" if str(source) in CLASSES else checks.path("errors", source)
 
 
 def read(source: str | Path) -> InstrumentErrors:
@@ -311,5 +335,5 @@ def read(source: str | Path) -> InstrumentErrors:
     >>> errors.drawn, (errors.gyro.bias / np.radians(1 / 3600)).round(6).tolist()
     (True, [0.01, 0.01, 0.01])
     """
-    path = _FOLDER / f"{source}.toml" if str(source) in CLASSES else checks.path("errors", source)
-    return ERRORS.convert(path, ErrorFile.errors)
+    path = path_of(source)
+    return ERRORS.convert(path, lambda file: file.errors(Path(path).parent))

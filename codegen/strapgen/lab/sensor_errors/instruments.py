@@ -4,21 +4,24 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field, replace
-from typing import Annotated
+from dataclasses import InitVar, dataclass, field, replace
+from fractions import Fraction
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from strapgen.catalogue.methods.sensor_response import Response
 from strapgen.catalogue.toml_models import Key
 from strapgen.ir.notebook_display import short_repr
 from strapgen.ir.read_only import ReadOnly
+from strapgen.ir.renamed import warn
 
 Array = NDArray[np.float64]
 
 #: Causes of errors by name, in the order of the signal: what of `InstrumentErrors` each of them has.
 CAUSES: dict[str, tuple[str, ...]] = {
-    "bandwidth": ("bandwidth_hz", "damping"),
+    "bandwidth": ("response",),
     "delay": ("delay",),
     "jitter": ("jitter",),
     "bias": ("bias",),
@@ -60,12 +63,12 @@ class TriadErrors(ReadOnly):
         Random walk of the bias in u/s/sqrt(s).
     pulse : array, (3,)
         Quantum of the angle (or velocity) in u; 0 for none.
-    bandwidth_hz : array, (3,)
-        Natural frequency of the response, of second order, in Hz; infinite for none.
-    damping : array, (3,)
-        Damping ratio of the response.
+    response : Response, or three of them
+        Response of the sensors about x, y and z; its delay adds to the others.
     delay : array, (3,)
         In s.
+    bandwidth_hz, damping : array, (3,)
+        Old: natural frequency in Hz, infinite for none, and damping ratio of a response of second order.
 
     Examples
     --------
@@ -82,11 +85,43 @@ class TriadErrors(ReadOnly):
     noise: Array = field(default_factory=zeros)
     random_walk: Array = field(default_factory=zeros)
     pulse: Array = field(default_factory=zeros)
-    bandwidth_hz: Array = field(default_factory=lambda: np.full(3, np.inf))
-    damping: Array = field(default_factory=lambda: np.full(3, 0.5**0.5))
+    response: Response | tuple[Response, ...] = field(default_factory=Response)
     delay: Array = field(default_factory=zeros)
+    bandwidth_hz: InitVar[Any] = None
+    damping: InitVar[Any] = None
 
     __repr__ = short_repr
+
+    def __post_init__(self, bandwidth_hz: Any, damping: Any) -> None:
+        """Put the delay of a response to the others, and one of second order in place of its numbers."""
+        several = self.responses
+        if bandwidth_hz is not None:
+            warn("bandwidth_hz of TriadErrors", "response")
+            several = second_order(bandwidth_hz, damping)
+        late = np.array([float(one.delay_s) for one in several])
+        object.__setattr__(self, "delay", self.delay + late)
+        object.__setattr__(self, "response", tuple(replace(one, delay_s=Fraction(0)) for one in several))
+        super().__post_init__()
+
+    @property
+    def responses(self) -> tuple[Response, ...]:
+        """The responses about x, y and z."""
+        return self.response if isinstance(self.response, tuple) else (self.response,) * 3
+
+
+def second_order(bandwidth_hz: Any, damping: Any = None) -> tuple[Response, ...]:
+    """Return responses of second order about x, y and z; one number is that of all three.
+
+    >>> [one.words for one in second_order([80, 80, np.inf], 0.7)]
+    ['second-order:80:0.7', 'second-order:80:0.7', 'increments']
+    """
+    numbers = (np.full(3, value, float) for value in (bandwidth_hz, 0.5**0.5 if damping is None else damping))
+    return tuple(
+        Response(frequency_hz=Fraction(str(hertz)), damping=Fraction(str(ratio)))
+        if np.isfinite(hertz)
+        else Response()
+        for hertz, ratio in zip(*(one.tolist() for one in numbers), strict=True)
+    )
 
 
 @dataclass(frozen=True)
@@ -275,7 +310,7 @@ class InstrumentErrors:
             "warm-up": bool(self.warm_up.rate.any()),
             "heating": bool(self.heating.gain.any()),
             "output noise": bool(self.output_noise.rms.any()),
-            "bandwidth": any(np.isfinite(triad.bandwidth_hz).any() for triad in triads),
+            "bandwidth": any(one.changes for triad in triads for one in triad.responses),
             "terms": any(value for triad in triads for value in triad.terms.values()),
         }
         if cause in one_number:

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from strapgen.catalogue.methods.sensor_response import Response
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.notebook_display import short_repr
 from strapgen.lab.sensor_errors.instruments import InstrumentErrors, TriadErrors
@@ -161,11 +162,7 @@ class _Triad:
         self, triad: TriadErrors, errors: InstrumentErrors, name: str, interval: float, streams: _Streams
     ) -> None:
         self._triad, self._name, self._interval, self._streams = triad, name, interval, streams
-        self._lag = (
-            _Lag(triad.bandwidth_hz, triad.damping, interval)
-            if np.isfinite(triad.bandwidth_hz).any()
-            else None
-        )
+        self._lags = [_Lag(one, interval) if one.changes else None for one in triad.responses]
         self._times = _SampleTimes(triad.delay, errors.sampling.jitter, interval)
         self._drift = np.zeros((1, 3))
         self._angle: Array | None = None
@@ -173,7 +170,8 @@ class _Triad:
 
     def sampled(self, row: Array, departures: Array | None) -> Array:
         """Return increments of the limited bandwidth, at the instants of the samples."""
-        row = row if self._lag is None else self._lag(row)
+        columns = [axis if lag is None else lag(axis) for axis, lag in zip(row.T, self._lags, strict=True)]
+        row = np.stack(columns, axis=1)
         if departures is None or not (self._triad.delay.any() or departures.any()):
             return row
         return self._times(row, departures)
@@ -345,25 +343,50 @@ class _LinearRecursion:
         return result, state
 
 
-def second_order(frequency: float, damping: float, interval: float) -> _LinearRecursion:
-    """Return the response 1/(1 + 2 zeta s/w + s^2/w^2) as a recursion on increments.
+def filtered(response: Response, interval: float) -> _LinearRecursion:
+    """Return the filter of a response as a recursion on increments.
 
-    It is exact for a rate that is constant over each interval. The state is the rate that comes out, in increments
-    per interval, and its derivative over w.
+    It is exact for a rate that is constant over each interval. The state is the rate that comes out, in increments an
+    interval, and its derivatives; the result its integral, or for instants the rate as the interval begins.
 
-    `frequency`: natural frequency w/(2 pi) in Hz. `interval`: in s.
+    `interval`: in s.
 
-    >>> settled = second_order(80, 0.7, 0.001).run(np.ones(3), np.array([1.0, 0.0]))[0]
-    >>> settled.round(12)
+    >>> gyro = Response(frequency_hz=Fraction(80), damping=Fraction(7, 10))
+    >>> filtered(gyro, 0.001).run(np.ones(3), np.array([1.0, 0.0]))[0].round(12)
     array([1., 1., 1.])
     """
-    turn = 2 * np.pi * frequency * interval  # w times the interval, the unit of time
-    # Of the rate, its derivative, the integral of the rate, and the constant that goes in.
-    system = np.zeros((4, 4))
-    system[0, 1], system[2, 0] = turn, 1.0
-    system[1] = [-turn, -2 * damping * turn, 0.0, turn]
+    instants = response.input == "instants"
+    if response.frequency_hz is None:  # the rate as an interval begins is the mean of those on both sides
+        half = np.array([0.5])
+        return _LinearRecursion(np.zeros((1, 1)), 2 * half, half, 0.5)
+    turn = 2 * np.pi * float(response.frequency_hz) * interval  # w times the interval, the unit of time
+    *below, highest = map(float, response.polynomial)
+    order = len(below)
+    # Of the rate, its derivatives, the integral of the rate, and the constant that goes in.
+    system = np.zeros((order + 2, order + 2))
+    system[: order - 1, 1:order] = turn * np.eye(order - 1)
+    system[order - 1, :order], system[order - 1, -1] = np.array(below) * -turn / highest, turn / highest
+    system[order, 0] = 1.0
     step = _exponential(system)
-    return _LinearRecursion(step[:2, :2], step[:2, 3], step[2, :2], float(step[2, 3]))
+    integral = (np.eye(order)[0], 0.0) if instants else (step[order, :order], float(step[order, -1]))
+    return _LinearRecursion(step[:order, :order], step[:order, -1], *integral)
+
+
+#: Taps in place of a table, and the part of half the sampling rate up to which they are fitted to it.
+_TABLE_TAPS, _FITTED = 64, 0.9
+
+
+def _table_taps(response: Response, interval: float) -> Array:
+    """Return taps whose response is nearest to that of a table, the newest first; they pass a constant rate as it does.
+
+    `interval`: from tap to tap in s.
+    """
+    turns = np.linspace(0.0, _FITTED * np.pi, 8 * _TABLE_TAPS)
+    wanted = Response(table=response.table).gain(turns / (2 * np.pi * interval))
+    waves = np.exp(-1j * np.outer(turns, np.arange(_TABLE_TAPS)))
+    columns, right = (np.concatenate([one.real, one.imag]) for one in (waves, wanted))
+    taps = np.linalg.lstsq(columns, right, rcond=1e-9)[0]
+    return np.asarray(taps * (wanted[0].real / taps.sum()))
 
 
 def bounded_noise(decay: float) -> _LinearRecursion:
@@ -391,24 +414,32 @@ def _exponential(matrix: Array) -> Array:
 
 
 class _Lag:
-    """The response of three sensors, part by part; before the first increment its rate has held for ever."""
+    """A response but for its delay, part by part; before the first increment its rate has held for ever."""
 
-    def __init__(self, bandwidth_hz: Array, damping: Array, interval: float) -> None:
-        self._recursions = [
-            second_order(frequency, ratio, interval) if np.isfinite(frequency) else None
-            for frequency, ratio in zip(bandwidth_hz, damping, strict=True)
-        ]
-        self._states: list[Array] | None = None
+    def __init__(self, response: Response, interval: float) -> None:
+        self._parts, inner = response.decimation, interval / response.decimation
+        instants = response.input == "instants"
+        has_recursion = response.frequency_hz is not None or instants
+        self._recursion = filtered(response, inner) if has_recursion else None
+        self._last = 0 if instants else self._parts - 1  # the newest internal sample of an interval
+        self._weights = np.array([float(weight) for weight in response.weights]) * self._parts
+        if response.table:
+            self._weights = np.convolve(self._weights, _table_taps(response, inner))
+        self._state, self._history = np.zeros(0), np.zeros(0)
 
     def __call__(self, row: Array) -> Array:
-        """Return what comes out for increments, (n, 3)."""
-        if self._states is None:
-            self._states = [np.array([first, 0.0]) for first in row[0]]
-        result = row.copy()
-        for axis, recursion in enumerate(self._recursions):
-            if recursion is not None:
-                result[:, axis], self._states[axis] = recursion.run(row[:, axis], self._states[axis])
-        return result
+        """Return what comes out for increments, (n,)."""
+        inner = np.repeat(row / self._parts, self._parts)
+        if not len(self._history):
+            self._history = np.full(max(1, len(self._weights) - 1), inner[0])
+            if self._recursion is not None:
+                self._state = inner[0] * np.eye(len(self._recursion.b))[0]
+        if self._recursion is not None:
+            inner, self._state = self._recursion.run(inner, self._state)
+        whole = np.concatenate([self._history, inner])
+        self._history = whole[len(inner) :]
+        result: Array = np.convolve(whole, self._weights)[len(self._history) : len(whole)]
+        return result[self._last :: self._parts]
 
 
 class _SampleTimes:
