@@ -14,7 +14,7 @@ Functions take the object, a name or a Choice alike:
   numbers     Settings, Format, gyro, exact: fixed point, pulses of a gyro, 40 digits
   motions     motion, read_motion, simulate; sensors with errors
   recordings  read, Recording, StampedGrid, propagate; rests, TrueAttitude, time_offset, attitude_error
-  judgement   compare, converge, check, rounding_bounds; unknowns, vibration, study
+  judgement   compare, converge, certify, check, rounding_bounds; unknowns, vibration, study
   your own    KernelBuilder, Signal, Stage, algebra, tableaux, windows, window_design; Target, Language
   navigation  read_system, system_runner, course, TwoSpeed, CommitLate, recording_attitudes, Preintegrator
   notebooks   formulas; to_rotation and from_rotation; plot, to_pandas and to_xarray of what runs return
@@ -86,6 +86,7 @@ if _typing.TYPE_CHECKING:
     from strapgen.kernel.kernel import Stage as Stage
     from strapgen.lab import sensor_errors as _sensor_errors
     from strapgen.lab import word_length as _word_length
+    from strapgen.lab.certificate.certificate import certify as certify
     from strapgen.lab.comparison import Comparison as Comparison
     from strapgen.lab.comparison import Comparisons as Comparisons
     from strapgen.lab.comparison import compare as compare
@@ -216,6 +217,7 @@ _NAMES = {
         "AttitudeAlgorithm",
         "algorithm",
     ),
+    "lab.certificate.certificate": ("certify",),
     "lab.comparison": (
         "Comparison",
         "Comparisons",

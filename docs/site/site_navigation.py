@@ -61,7 +61,7 @@ SECTIONS = (
         "Recordings",
         "docs/recorded-data.md",
         "You have a log, and want its attitude and the error of it.",
-        _docs("stamped-samples", "sensor-data"),
+        _docs("stamped-samples", "sensor-data", "certificate"),
     ),
     Section(
         "Paper",

@@ -2,24 +2,17 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
-from fractions import Fraction
 
-import numpy as np
 import pytest
-from derived import program
-from small_programs import node
-from small_programs import program as small
 
 from strapgen.catalogue import choose, choose_step
 from strapgen.evidence import actual_errors
-from strapgen.evidence.actual_errors import ball
 from strapgen.evidence.collection import Subject
 from strapgen.firmware.vectors import vectors_of_choice
 from strapgen.ir.fixed_settings import Settings
 
-flint = pytest.importorskip("flint")
+pytest.importorskip("flint")
 
 PRODUCT, EULER = Subject(choose("euler-product")), Subject(choose_step("euler", "rk4", 2))
 
@@ -95,65 +88,3 @@ def test_a_step_whose_bound_of_a_run_has_no_end_is_not_examined(monkeypatch):
     verdicts = actual_errors.check(Subject(choose_step("euler", "rk1", 2)), None)
     assert [verdict.result for verdict in verdicts] == ["agrees", "not examined"]
     assert [verdict.claim for verdict in verdicts] == ["error bound: 50 calls", "error bound: 50 steps"]
-
-
-def _balls(values):
-    return [ball(Fraction(float(x))) for x in np.ravel(values)]
-
-
-def test_the_angle_between_attitudes_is_that_of_a_rotation():
-    quaternion = np.array([0.0, 0.0, np.sin(0.05), np.cos(0.05)])
-    assert actual_errors.angle_between(_balls([0, 0, 0, 1]), _balls(-3 * quaternion)) == pytest.approx(
-        0.1, rel=1e-14
-    )
-    turn = np.array([[np.cos(0.1), -np.sin(0.1), 0], [np.sin(0.1), np.cos(0.1), 0], [0, 0, 1]])
-    stretched = turn @ np.array([[1.05, 0.01, 0], [0.01, 0.97, 0.02], [0, 0.02, 1]])
-    assert actual_errors.angle_between(_balls(np.eye(3)), _balls(stretched)) == pytest.approx(0.1, rel=1e-13)
-    with flint.ctx.workprec(200):
-        tiny = [ball(Fraction(0)), ball(Fraction(1, 10**20)), ball(Fraction(0)), ball(Fraction(1))]
-    assert actual_errors.angle_between(_balls([0, 0, 0, 1]), tiny) == pytest.approx(2e-20, rel=1e-9)
-
-
-def test_a_ball_holds_a_third():
-    assert actual_errors.ball(Fraction(1, 3)).contains(flint.fmpq(1, 3))
-
-
-@pytest.mark.parametrize(
-    ("kind", "arguments"),
-    [
-        *(
-            ("sin", (2,)),
-            ("cos", (2,)),
-            ("atan2", (1, -2)),
-            ("sqrt", (2,)),
-            ("sqrt", (0,)),
-            ("maximum", (1, 2)),
-        ),
-        *(("wrap", (4,)), ("wrap", (-4,)), ("wrap", (1,)), ("sinc", (1,)), ("sinc", (0,))),
-    ],
-)
-def test_functions_of_balls_are_those_of_programs(kind, arguments):
-    names = [f"x{k}" for k in range(len(arguments))]
-    code = small({"y": node(kind, *names)}, dict.fromkeys(names, 9))
-    exact = code.run({name: float(x) for name, x in zip(names, arguments, strict=True)})["out"][0]
-    (near,) = actual_errors.evaluate_single(code, [actual_errors.column_of([x]) for x in arguments])
-    assert float(near[0]) == pytest.approx(float(exact), abs=1e-14)
-
-
-def test_a_comparison_that_a_ball_leaves_open_holds_both_values():
-    code = small({"y": node("select", node("at_least", "x", 0), 1, 5)}, {"x": 1})
-    (unsure,) = actual_errors.evaluate_single(code, [flint.arb(0, 1)])
-    assert unsure.contains(flint.arb(1))
-    assert unsure.contains(flint.arb(5))
-    assert actual_errors.evaluate_single(code, [flint.arb(-1)]) == [5]
-
-
-def test_products_in_pairs_are_products_in_order():
-    product = program(choose("euler-product"))
-    turns = [[math.sin(k + row) for k in range(7)] for row in range(4)]
-    columns = [np.array([flint.arb(x) for x in row], object) for row in turns]
-    expected = [column[0] for column in columns]
-    for k in range(1, 7):
-        expected = actual_errors.evaluate_single(product, [*expected, *(column[k] for column in columns)])
-    pairs = zip(actual_errors.product_in_pairs(product, columns), expected, strict=True)
-    assert all(near.overlaps(other) and near.rad() < 1e-10 for near, other in pairs)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from strapgen.catalogue.choice import AnyAlgorithm, Choice, named, orthonormalizations, state_name
 from strapgen.catalogue.choosing import choose, choose_step, standard
-from strapgen.catalogue.derivation import companion, derive, enough, nodes, rounding
+from strapgen.catalogue.derivation import companion, derive, enough, fit, nodes, rounding
 from strapgen.catalogue.kernels.kernel_names import MOTIONS, TWO_SPEED, UPDATE_ORDERS
 from strapgen.catalogue.methods.method_spec import MOST_BESIDE, MOST_INCREMENTS, Integrator
 from strapgen.catalogue.names import (
@@ -47,6 +47,7 @@ __all__ = [
     "companion",
     "derive",
     "enough",
+    "fit",
     "named",
     "nodes",
     "orthonormalizations",

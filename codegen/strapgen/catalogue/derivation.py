@@ -16,6 +16,7 @@ from strapgen.ir.timing import timed
 if TYPE_CHECKING:
     from strapgen.catalogue.coefficients import Number
     from strapgen.catalogue.methods.method import Method
+    from strapgen.catalogue.methods.rate_fit import Fit
     from strapgen.kernel.kernel import Kernel
 
 #: The package of the modules in `names`.
@@ -51,6 +52,19 @@ def enough(method: AnyMethod) -> int:
     return next(
         count for count in range(1, MOST_INCREMENTS + 1) if loaded.limit(count, 0, 0) >= min(loaded.order, 10)
     )
+
+
+def fit(choice: Choice) -> Fit | None:
+    """Return the rate over a step in terms of its increments; None where the step has no such rate.
+
+    A step that takes rates has none, nor has a user's, nor a pair of filters, whose product counts.
+    """
+    if choice.method is None or choice.increments is None:
+        return None
+    method = _method(choice.method)
+    if method.window is not None and method.window.form == "pair":
+        return None
+    return method.fit(choice.increments, choice.previous, choice.ahead)
 
 
 def derive(choice: Choice) -> Kernel:

@@ -1,18 +1,16 @@
 """Certifies in ball arithmetic the errors of single calls and runs in fixed point.
 
-The integer model computes what the C computes; the exact program is evaluated on the same integers in balls, numbers
-with a radius in which the exact value is certain to lie. Radii grow with every operation. Products of transitions are
-multiplied in pairs, then in pairs of pairs, so that radii grow with the number of levels, not with that of the steps.
+The integer model computes what the C computes; the exact program is evaluated on the same integers in balls. Runs are
+those of a certificate.
 """
 
 from __future__ import annotations
 
 import importlib.metadata
 import random
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Sequence
 from fractions import Fraction
 from functools import partial
-from itertools import islice
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -24,19 +22,16 @@ from strapgen.evidence.collection import Result, Subject, Tool, Verdict, verdict
 from strapgen.firmware.vectors import MODEL, vectors_of_choice
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.interfaces import AngleAccumulation
-from strapgen.ir.program import OPERATIONS, Program
+from strapgen.lab.certificate.balls import ball, column_of, evaluate
+from strapgen.lab.certificate.certificate import roundings
 from strapgen.run.compiled_code import ModelEvaluator
 
 #: Calls, and steps of a run; steps from one look at the state to the next.
 COUNT, BETWEEN = 10_000, 100
 #: Bits of balls, and the largest radius in units of the last place.
 PRECISION, LARGEST_RADIUS = 384, Fraction(1, 100)
-#: Bits of the balls of a run with orthonormalizations: there are no products to be grouped, and radii grow.
-_MORE_BITS = 8192
 #: Part of their range that the increments fill where no number of steps is proved to keep the state proper.
 _SMALL = Fraction(1, 128)
-#: Iterations from a matrix to the nearest rotation; each squares the distance.
-_ITERATIONS = 10
 #: The orthonormalization of a run of matrices, which keeps the nearest rotation.
 _MATRIX_NORMALIZATION = "dcm-orthonormalize-first-order"
 TOOL = Tool(
@@ -141,27 +136,47 @@ def random_run_angle(subject: Subject, angles: AngleAccumulation, steps: int, se
     limit = samples.high if every else int(samples.high * _SMALL)
     increments = [[stream.randint(-limit, limit) for _ in range(samples.signal.size)] for _ in range(steps)]
     identity = subject.program.attitude_step.identity if subject.program.attitude_step else ()
-    words, count, worst, proper = [int(one / state.unit) for one in identity], 0, (0.0, 1.0), True
+    words, count, proper = [int(one / state.unit) for one in identity], 0, True
     feedback = [entry.fresh for entry in subject.fixed.interface.residuals]
-    exact = exact_states(subject, increments, between, normalization if between == every else None)
+    matrix = len(state.signal.shape) == 2
+    begins, ends = [words], []
     for step, row in enumerate(increments, 1):
         results = model(words, row, *([feedback] if feedback else []))
         words, feedback = [*results[0]], [*results[1]] if feedback else []
         proper = proper and _is_proper([float(word * state.unit) for word in words], angles)
+        last = words
         if every and step % every == 0:
             words, count = [*normalization.model(words)[0]], count + 1
         if step % between == 0:
-            angle = angle_between([ball(word * state.unit) for word in words], next(exact))
-            bound = angles.bound(step, count, normalization.error)
-            worst = max(worst, (angle, bound), key=lambda pair: pair[0] / pair[1])
+            ends.append(last if matrix else words)
+            begins.append(words)
+    turns = np.array(increments[: between * len(ends)], np.float64) * float(samples.unit)
+    blocks = turns.reshape(len(ends), -1, 3)
+
+    def numbers(words: Sequence[int]) -> Any:
+        return np.array([float(word * state.unit) for word in words])
+
+    worst = (0.0, 1.0)
+    if matrix and every:  # whose orthonormalization turns it by what truncation has left: each part by itself
+        parts = ([begin, end] for begin, end in zip(begins, ends, strict=False))
+        found = [
+            (next(roundings(subject.choice, between, [*map(numbers, part)], [block])), angles.bound(between))
+            for part, block in zip(parts, blocks, strict=True)
+        ]
+    else:
+        states = [numbers(words) for words in [begins[0], *ends]]
+        done = [(k + 1) * between for k in range(len(ends))]
+        bounds = [angles.bound(n, n // every if every else 0, normalization.error) for n in done]
+        found = [*zip(roundings(subject.choice, between, states, blocks), bounds, strict=True)]
+    for departed, bound in found:
+        worst = max(worst, (departed.angle.above, bound), key=lambda pair: pair[0] / pair[1])
     return CertifiedRun(steps, count, *worst, proper)
 
 
 class _Normalization(NamedTuple):
-    """The kernel that normalizes a state: its integer model, its program, and the error of an element."""
+    """The kernel that normalizes a state: its integer model, and the error of an element."""
 
     model: Any
-    program: Program
     error: Fraction
 
 
@@ -176,57 +191,7 @@ def _models(subject: Subject) -> tuple[Any, _Normalization]:
         ModelEvaluator(pipeline.compile(part.choice, MODEL, part.settings)).step
         for part in (subject, normalization)
     )
-    return step, _Normalization(
-        normalize, normalization.program, max(normalization.fixed.interface.outputs[0].errors)
-    )
-
-
-def exact_states(
-    subject: Subject,
-    increments: Iterable[Sequence[int]],
-    between: int,
-    normalization: _Normalization | None = None,
-) -> Iterator[list[Any]]:
-    """Yield balls of the exact state after every block of steps; with a normalization, after that."""
-    from flint import ctx
-
-    samples = subject.fixed.interface.inputs[1]
-    kernels, transition = subject.program.attitude_step, subject.program.transition_program()
-    assert kernels is not None
-    product = pipeline.program(choose(str(kernels.product)))
-    exact = [ball(one) for one in kernels.identity]
-    steps = iter(increments)
-    while len(rows := list(islice(steps, between))) == between:
-        with ctx.workprec(_MORE_BITS if normalization else PRECISION):
-            columns = [column_of(column) * ball(samples.unit) for column in zip(*rows, strict=True)]
-            exact = evaluate_single(
-                product, [*exact, *product_in_pairs(product, evaluate_single(transition, columns))]
-            )
-            if normalization:
-                exact = evaluate_single(normalization.program, exact)
-        yield exact
-
-
-def angle_between(state: Sequence[Any], exact: Sequence[Any]) -> float:
-    """Return an upper end of the angle between two attitudes, in rad."""
-    from flint import arb, arb_mat, ctx
-
-    with ctx.workprec(PRECISION):
-        if len(state) == 4:
-            dot = sum(x * y for x, y in zip(state, exact, strict=True))
-            lengths = sum(x * x for x in state) * sum(y * y for y in exact)
-            sine = ((lengths - dot * dot) / lengths).nonnegative_part().sqrt()
-            return float((2 * sine.asin()).upper())
-        first, second = (_nearest_rotation(arb_mat(3, 3, [*elements])) for elements in (state, exact))
-        apart = sum((x * x for x in (first - second).entries()), arb(0))
-        return float((2 * (apart / 8).sqrt().asin()).upper())
-
-
-def _nearest_rotation(matrix: Any) -> Any:
-    """Return the rotation nearest to a matrix, by Newton's iteration."""
-    for _ in range(_ITERATIONS):
-        matrix = (matrix + matrix.inv().transpose()) / 2
-    return matrix
+    return step, _Normalization(normalize, max(normalization.fixed.interface.outputs[0].errors))
 
 
 def _is_proper(values: Sequence[float], angles: AngleAccumulation) -> bool:
@@ -236,79 +201,3 @@ def _is_proper(values: Sequence[float], angles: AngleAccumulation) -> bool:
         return float(np.linalg.norm(values)) >= shortest
     singular = np.linalg.svd(np.reshape(values, (3, 3)), compute_uv=False)
     return bool(singular[-1] >= shortest and singular[0] <= np.sqrt(2 - shortest**2))
-
-
-def ball(number: Fraction) -> Any:
-    """Return a ball that holds a number."""
-    from flint import arb, fmpq
-
-    return arb(fmpq(number.numerator, number.denominator))
-
-
-def column_of(integers: Sequence[int]) -> Any:
-    """Return integers as an array of balls: numpy's loops over objects call their operators."""
-    from flint import arb
-
-    column = np.empty(len(integers), object)
-    column[:] = [arb(value) for value in integers]
-    return column
-
-
-def evaluate_single(program: Program, values: Sequence[Any]) -> list[Any]:
-    """Return the elements of a program's only output."""
-    (elements,) = evaluate(program, values)
-    return elements
-
-
-def evaluate(program: Program, values: Sequence[Any]) -> list[list[Any]]:
-    """Return the elements of each output of a program, see `evaluate_single`."""
-    names = [name for signal in program.inputs for name in signal.elements]
-    results = program.run(dict(zip(names, values, strict=True)), ball, _operations())
-    return [results[result.signal.name] for result in program.outputs]
-
-
-def product_in_pairs(product: Program, turns: Sequence[Any]) -> list[Any]:
-    """Return the product of transitions."""
-    while len(turns[0]) > 1:
-        odd = len(turns[0]) % 2
-        pairs = [[column[k : len(column) - odd : 2] for column in turns] for k in (0, 1)]
-        last = [column[len(column) - odd :] for column in turns]
-        turns = [
-            np.concatenate(parts)
-            for parts in zip(evaluate_single(product, [*pairs[0], *pairs[1]]), last, strict=True)
-        ]
-    return [column[0] for column in turns]
-
-
-def _operations() -> dict[str, Callable[..., Any]]:
-    """Return the operations of programs on balls, and on arrays of them."""
-    from flint import arb
-
-    def root(x: Any) -> Any:  # a radicand that exists is not negative, whatever its ball holds beside
-        return x.sqrt() if x < 0 else x.nonnegative_part().sqrt()
-
-    def at_least(x: Any, y: Any) -> bool | None:
-        difference = x - y
-        return True if difference >= 0 else False if difference < 0 else None
-
-    def select(condition: bool | None, yes: Any, no: Any) -> Any:
-        return yes.union(no) if condition is None else yes if condition else no
-
-    def wrap(x: Any) -> Any:
-        return select(
-            at_least(x, arb.pi()), x - 2 * arb.pi(), select(at_least(-x, arb.pi()), x + 2 * arb.pi(), x)
-        )
-
-    functions: dict[str, tuple[Callable[..., Any], int]] = {
-        "sqrt": (root, 1),
-        "sin": (lambda x: x.sin(), 1),
-        "cos": (lambda x: x.cos(), 1),
-        "sinc": (lambda x: x.sinc(), 1),
-        "atan2": (lambda y, x: arb.atan2(y, x), 2),
-        "direction": (lambda y, x: arb.atan2(y, x), 2),
-        "wrap": (wrap, 1),
-        "maximum": (lambda x, y: x.max(y), 2),
-        "at_least": (at_least, 2),
-        "select": (select, 3),
-    }
-    return {**OPERATIONS, **{kind: np.frompyfunc(f, count, 1) for kind, (f, count) in functions.items()}}

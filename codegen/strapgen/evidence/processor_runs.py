@@ -20,13 +20,13 @@ from typing import Any
 import numpy as np
 
 from strapgen import pipeline
-from strapgen.evidence.actual_errors import LARGEST_RADIUS, PRECISION, ball, exact_states
 from strapgen.evidence.collection import Result, Subject, Tool, Verdict, verdict
 from strapgen.firmware.vectors import MODEL, model_call
 from strapgen.firmware.vectors_c import CallVector
 from strapgen.ir.exceptions import CompilerError
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.interfaces import Argument, Interface
+from strapgen.lab.certificate.certificate import roundings
 from strapgen.lab.motions.motions import GENERAL, Motion, motion
 from strapgen.lab.processors import RUNNERS, Runner
 from strapgen.lab.runner_c import (
@@ -294,8 +294,7 @@ def million_steps(subject: Subject, folder: Path) -> list[Verdict]:
             )
         except CompilerError as error:
             return "fails", str(error)
-        exact = exact_states(fed_back, noisy_integers(run), len(run.rows))
-        return compared(read_states(said), [*exact], run)
+        return compared(read_states(said), fed_back, run)
 
     return [verdict(subject.name, f"error of a million steps: {runner.name}", tool, judge)]
 
@@ -327,27 +326,29 @@ def noisy_integers(run: LongRun) -> Iterator[list[int]]:
             yield [value - run.noise + draws.draw() % width for value in row]
 
 
-def compared(
-    states: Sequence[Sequence[int]], exact: Sequence[Sequence[Any]], run: LongRun
-) -> tuple[Result, str]:
-    """Return whether states are as near to balls as is claimed, in units of the last place."""
-    from flint import ctx
-
-    assert run.sources.fixed is not None
-    if len(states) < len(exact):
+def compared(states: Sequence[Sequence[int]], subject: Subject, run: LongRun) -> tuple[Result, str]:
+    """Return whether states are as near to exact ones as is claimed, in units of the last place."""
+    fixed = run.sources.fixed
+    assert fixed is not None
+    state, samples = fixed.inputs
+    if len(states) < run.passes:
         return "fails", f"a step is refused in pass {len(states) + 1}"
-    unit = run.sources.fixed.inputs[0].unit
-    with ctx.workprec(PRECISION):
-        apart = [
-            element / ball(unit) - word
-            for state, balls in zip(states, exact, strict=True)
-            for word, element in zip(state, balls, strict=True)
-        ]
-        error = max(float(abs(distance).upper()) for distance in apart)
-        radius = max(float(distance.rad()) for distance in apart)
-    said = options(run.sources.fixed.settings, run.sources.function.inputs)
-    near = error < LARGEST_ERROR and radius < LARGEST_RADIUS
-    return "agrees" if near else "fails", (
-        f"{len(run.rows) * run.passes} steps of coning with noise, formats of {said}: at most {error:.2f} units of "
-        f"the last place from balls of a radius below 1e{int(f'{radius:e}'.partition('e')[2]) + 1:+03d}"
+    steps, drawn = len(run.rows), noisy_integers(run)
+    begin = (
+        [float(one) for one in subject.program.attitude_step.identity]
+        if subject.program.attitude_step
+        else []
+    )
+    numbers = [np.array(begin), *(np.array(words) * float(state.unit) for words in states)]
+    passes = (
+        np.array([next(drawn) for _ in range(steps)]).reshape(-1, 3) * float(samples.unit)
+        for _ in range(run.passes)
+    )
+    error = 0.0
+    for departed in roundings(subject.choice, steps, numbers, passes):
+        error = max(error, departed.distance / float(state.unit))
+    said = options(fixed.settings, run.sources.function.inputs)
+    return "agrees" if error < LARGEST_ERROR else "fails", (
+        f"{steps * run.passes} steps of coning with noise, formats of {said}: at most {error:.2f} units of the last "
+        "place from exact states, by balls"
     )

@@ -22,6 +22,11 @@ REGISTRATION = Registration(
             "Run",
             summary="Show what a log holds, and the command that runs it",
         ),
+        "certify": Command(
+            f"{__package__}.certify_command:certify",
+            "Analyse",
+            summary="Certify what rounding and the method did to the attitude on a recorded run",
+        ),
         "converge": Command(
             f"{__package__}.converge_command:converge",
             "Analyse",
@@ -50,6 +55,7 @@ REGISTRATION = Registration(
         "spread": f"{__package__}.attitude_spread:SpreadResult",
         "convergence": f"{__package__}.convergence_report:ConvergenceResult",
         "word-length": f"{__package__}.word_length_report:WordLengthResult",
+        "certificate": f"{__package__}.certificate.certificate_report:CertificateResult",
         "cost": f"{__package__}.cost:CostResult",
         "random-runs": f"{__package__}.random_runs:RandomRunsResult",
         "sensor-errors": f"{__package__}.sensor_error_study:SensorErrorResult",

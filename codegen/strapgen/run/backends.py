@@ -188,6 +188,11 @@ class Backend:
         """Nodes at which a step takes the rate, as fractions of its length; empty if it takes increments."""
         return self._parts.nodes
 
+    @property
+    def choice(self) -> Choice | None:
+        """The choice of the step; None where its sources do not tell it."""
+        return self._parts.choice
+
     def companion(self, kernel: str) -> Evaluator:
         """Return another kernel on the same target as the step: one that restores a state, or converts it.
 

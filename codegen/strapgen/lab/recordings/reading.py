@@ -186,9 +186,11 @@ def increments(log: LogFile, topic: str, reading: Reading) -> Increments:
         remarks.append(f"{counted(left, 'increment')} left out, which fill no sum of {every}")
     if len(breaks) > 1:
         remarks.append(f"it is split into {len(breaks)} pieces")
-    factors = [float(units.RATES[meaning.unit or "rad/s"])] * 3
-    factors += [float(units.FORCES[meaning.force_unit or "m/s^2"])] * (table.width - 3)
-    angle, velocity = _turned_and_scaled(table, [1.0] * 6 if kind == "increments" else factors, reading.axes)
+    factors = [1.0] * 6  # of increments, in rad and m/s
+    if kind != "increments":
+        of_rate, of_force = units.RATES[meaning.unit or "rad/s"], units.FORCES[meaning.force_unit or "m/s^2"]
+        factors = [float(of_rate)] * 3 + [float(of_force)] * (table.width - 3)
+    angle, velocity = _turned_and_scaled(table, factors, reading.axes)
     if not all(
         np.isfinite(part).all()
         for array in (angle, velocity)

@@ -218,6 +218,15 @@ class InertialRecording(Recording):
 
 
 @dataclass(frozen=True)
+class Taken:
+    """What a run along one piece of a recording took."""
+
+    recording: Recording
+    pulse: float | str | Fraction | None = None  # rad
+    orthonormalize_every: int = 0  # steps; 0 for never
+
+
+@dataclass(frozen=True)
 class History(Records):
     """The attitude along a recording.
 
@@ -237,6 +246,8 @@ class History(Records):
         The back end whose states they are; None where the states are no attitudes.
     piece : array, (N,), optional
         Number of the piece of the recording, from 1 on; None where it has no gaps.
+    taken : Taken, optional
+        The recording, and what else the run took; None where it has gaps, or another unit ran.
 
     Examples
     --------
@@ -253,6 +264,7 @@ class History(Records):
     elements: tuple[str, ...] = ()
     backend: Backend | None = field(default=None, repr=False, compare=False)
     piece: NDArray[Any] | None = None
+    taken: Taken | None = field(default=None, repr=False, compare=False)
 
     __repr__ = short_repr
 
@@ -587,6 +599,7 @@ def along_pieces(recording: Recording, run: Callable[[Any], History], least: int
         states=np.concatenate([one.states for one in histories]),
         unused=short + sum(one.unused for one in histories),
         piece=np.repeat(np.arange(1, 1 + len(histories)), [len(one.time) for one in histories]),
+        taken=None,
     )
 
 
@@ -622,7 +635,8 @@ def _along(
     time: Array = start + step * record_every * np.arange(len(states), dtype=np.float64)
     require_finite(backend, states, time)
     require_proper(backend, states, time)
-    return History(time, states, step, unused, backend.elements, backend)
+    taken = Taken(recording, pulse, every or 0)
+    return History(time, states, step, unused, backend.elements, backend, taken=taken)
 
 
 def record_interval(what: str, value: float | str | Fraction, step: float) -> int:

@@ -1,0 +1,59 @@
+"""The exact step of an algorithm in balls, and the error of computed states beside it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from strapgen import pipeline
+from strapgen.catalogue import Choice, choose
+from strapgen.ir.exceptions import InputError
+from strapgen.lab.certificate.balls import column_of, evaluate_single, product_in_pairs
+
+Array = NDArray[np.float64]
+
+
+class ExactStep:
+    """A step that multiplies the state by a transition: its transition, its product and its attitude, in balls."""
+
+    def __init__(self, choice: Choice) -> None:
+        program = pipeline.program(choice)
+        kernels = program.attitude_step
+        if kernels is None or kernels.product is None or program.inputs[1].name != "increments":
+            raise InputError(
+                f"a certificate needs a step that multiplies the attitude by a transition; {choice.kernel} does not"
+            )
+        self.choice = choice
+        self._transition = program.transition_program()
+        self._product = pipeline.program(choose(kernels.product))
+        self._attitude = None if kernels.attitude is None else pipeline.program(choose(kernels.attitude))
+
+    def transitions(self, samples: Array) -> list[Any]:
+        """Return the product of the transitions of blocks of steps.
+
+        `samples` (K, n, samples, 3): increments in rad, exact. Returns the elements, (K,) each.
+        """
+        blocks, steps = samples.shape[:2]
+        flat = samples.reshape(blocks * steps, -1)
+        values = [column_of(column.tolist()) for column in flat.T]
+        turns = evaluate_single(self._transition, values)
+        shaped = [np.broadcast_to(turn, blocks * steps).reshape(blocks, steps) for turn in turns]
+        return product_in_pairs(self._product, shaped)
+
+    def state(self, numbers: NDArray[Any]) -> list[Any]:
+        """Return a state of numbers in double as balls."""
+        return [*column_of(numbers.ravel().tolist())]
+
+    def after(self, state: Sequence[Any], turn: Sequence[Any]) -> list[Any]:
+        """Return a state after a transition."""
+        return evaluate_single(self._product, [*state, *turn])
+
+    def matrix(self, state: Sequence[Any]) -> Any:
+        """Return the direction cosines of a state, times its length squared where it has one."""
+        from flint import arb_mat
+
+        elements = state if self._attitude is None else evaluate_single(self._attitude, state)
+        return arb_mat(3, 3, [*elements])
