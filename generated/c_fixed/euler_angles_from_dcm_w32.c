@@ -336,13 +336,13 @@ int euler_angles_from_dcm_w32(const int32_t state[9], const int32_t previous[3],
     const int32_t next_roll_case_angle_ser_2 = euler_angles_from_dcm_w32_fit(
         euler_angles_from_dcm_w32_shr(euler_angles_from_dcm_w32_mul(
         next_roll_case_angle_square, next_roll_case_angle_series), 2)
-        + INT64_C(4054853068024446976) /* 0.10990701262248558 in Q35 */, 31);
-        /* 0.0941 .. 0.11, error 1.1e-10 */
+        + INT64_C(4054853068024446976) /* 0.10990701262248558 in Q35 */
+        + (INT32_C(1) << 30), 31); /* 0.0941 .. 0.11, error 7.3e-11 */
     const int32_t next_roll_case_angle_ser_3 = euler_angles_from_dcm_w32_near(
         euler_angles_from_dcm_w32_shr(euler_angles_from_dcm_w32_mul(
         next_roll_case_angle_square, next_roll_case_angle_ser_2), 2)
         - INT64_C(5267120772870045696) /* 0.14276559461088406 in Q35 */);
-        /* Q-2.33, -0.143 .. -0.121, error 1.1e-10 */
+        /* Q-2.33, -0.143 .. -0.121, error 9.7e-11 */
     const int32_t next_roll_case_angle_ser_4 = euler_angles_from_dcm_w32_near(
         euler_angles_from_dcm_w32_shr(euler_angles_from_dcm_w32_mul(
         next_roll_case_angle_square, next_roll_case_angle_ser_3), 1)
@@ -626,14 +626,14 @@ int euler_angles_from_dcm_w32(const int32_t state[9], const int32_t previous[3],
         - INT64_C(5267120771796303872) /* 0.14276559461088406 in Q34 */, 32);
         /* Q-2.33, -0.143 .. -0.121, error 1.9e-10 */
     const int32_t next_hdg_case_angle_ser_4 = INT32_C(
-        1717955826) /* 0.19999638041759513 in Q33 */ + euler_angles_from_dcm_w32_fit(
+        1717955826) /* 0.19999638041759513 in Q33 */ + euler_angles_from_dcm_w32_near(
         euler_angles_from_dcm_w32_mul(next_hdg_case_angle_square,
-        next_hdg_case_angle_ser_3), 32); /* 0.172 .. 0.2, error 2.4e-10 */
+        next_hdg_case_angle_ser_3)); /* 0.172 .. 0.2, error 1.8e-10 */
     const int32_t next_hdg_case_angle_ser_5 = euler_angles_from_dcm_w32_near(
         euler_angles_from_dcm_w32_shr(euler_angles_from_dcm_w32_mul(
         next_hdg_case_angle_square, next_hdg_case_angle_ser_4), 1)
         - INT64_C(6148913519426273280) /* 0.33333326976907529 in Q33 */);
-        /* Q-1.32, -0.334 .. -0.295, error 2.5e-10 */
+        /* Q-1.32, -0.334 .. -0.295, error 2.4e-10 */
     const int32_t next_hdg_case_angle_bend = -1 /* 3.2439199325215087e-10 in Q32 */
         + euler_angles_from_dcm_w32_near(euler_angles_from_dcm_w32_mul(
         next_hdg_case_angle_square, next_hdg_case_angle_ser_5));
@@ -645,7 +645,7 @@ int euler_angles_from_dcm_w32(const int32_t state[9], const int32_t previous[3],
     const int64_t next_hdg_case_angle_angle = euler_angles_from_dcm_w32_shr(
         next_hdg_case_angle_atan, 2) + INT64_C(3622009729038561421);
         /* Q1.62, 0.394 .. 1.23, error 2.8e-10 */
-    int64_t next_hdg_case_angle_octant; /* Q1.62, -2.77e-10 .. 0.786, error 2.8e-10 */
+    int64_t next_hdg_case_angle_octant; /* Q1.62, -2.76e-10 .. 0.786, error 2.8e-10 */
     if (next_hdg_case_angle_beyond >= 0) {
         next_hdg_case_angle_octant = next_hdg_case_angle_angle;
     } else {
@@ -654,7 +654,7 @@ int euler_angles_from_dcm_w32(const int32_t state[9], const int32_t previous[3],
     const int64_t next_hdg_case_angle_angle_2 = euler_angles_from_dcm_w32_shr(
         -next_hdg_case_angle_octant, 1) + INT64_C(3622009729038561421);
         /* Q2.61, 0.785 .. 1.58, error 2.8e-10 */
-    int64_t next_hdg_case_angle_quad; /* Q1.62, -2.77e-10 .. 1.58, error 2.8e-10 */
+    int64_t next_hdg_case_angle_quad; /* Q1.62, -2.76e-10 .. 1.58, error 2.8e-10 */
     if ((int64_t)next_hdg_case_angle_width >= (int64_t)next_hdg_case_angle_height) {
         next_hdg_case_angle_quad = next_hdg_case_angle_octant;
     } else {
@@ -663,14 +663,14 @@ int euler_angles_from_dcm_w32(const int32_t state[9], const int32_t previous[3],
     const int64_t next_hdg_case_angle_angle_3 = euler_angles_from_dcm_w32_shr(
         -next_hdg_case_angle_quad, 2) + INT64_C(3622009729038561421);
         /* Q3.60, 1.57 .. 3.15, error 2.8e-10 */
-    int64_t next_hdg_case_angle_half; /* Q2.61, -2.77e-10 .. 3.15, error 2.8e-10 */
+    int64_t next_hdg_case_angle_half; /* Q2.61, -2.76e-10 .. 3.15, error 2.8e-10 */
     if ((int64_t)C_11 >= 0) {
         next_hdg_case_angle_half = euler_angles_from_dcm_w32_shr(next_hdg_case_angle_quad, 1);
     } else {
         next_hdg_case_angle_half = next_hdg_case_angle_angle_3 * 2;
     }
     const int64_t next_hdg_case_angle_angle_4 = -next_hdg_case_angle_half;
-        /* Q2.61, -3.15 .. 2.77e-10, error 2.8e-10 */
+        /* Q2.61, -3.15 .. 2.76e-10, error 2.8e-10 */
     int64_t next_hdg_case_angle_side; /* Q2.61, -3.15 .. 3.15, error 2.8e-10 */
     if ((int64_t)C_21 >= 0) {
         next_hdg_case_angle_side = next_hdg_case_angle_half;

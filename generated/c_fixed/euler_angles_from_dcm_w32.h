@@ -11,7 +11,7 @@
  * Heading - roll at pitch up, heading + roll at pitch down, are as good as the matrix at every
  * pitch.
  * Errors of angles are told without whole turns.
- * Integer operations of one call: 89 add, 37 multiply, 87 shift, 4 divide, 1 sqrt, 56 compare;
+ * Integer operations of one call: 91 add, 37 multiply, 87 shift, 4 divide, 1 sqrt, 56 compare;
  *     138 temporaries.
  *
  * A number in format Qm.n is an integer times 2^-n. Rounding: nearest. No intermediate sum or
@@ -55,7 +55,7 @@ extern "C" {
  *         2^-29 rad; range -1686629857 to 1686629857 (-3.1416 to 3.1416).
  * out     next[3]: Euler angles: roll, pitch, heading; found_roll, found_pitch, found_heading;
  *         format Q2.29, unit 2^-29 rad; range -1686629858 to 1686629858 (-3.1416 to 3.1416);
- *         error <= 6.18758e-09 (3.3220 ulp).
+ *         error <= 6.18756e-09 (3.3220 ulp).
  * Returns 0; or, with the outputs unchanged, 1 if an input lies outside its range,
  * 2 if it is too far from a proper one, so that an intermediate value leaves its range:
  *   next_pitch_distance from 0.5 to 2; apart_distance from 0.5 to 8.
@@ -86,9 +86,9 @@ int euler_angles_from_dcm_w32(const int32_t state[9], const int32_t previous[3],
  * let: apart = direction(steep_sine, steep_cosine)
  * let: next_heading = select(at_least(cosine_squared, (1/4)), atan2(C_21, C_11), wrap(apart +
  *   select(at_least(0, C_31), next_roll, -next_roll)))
- * ensures: |next[0] / 2^29 - next_roll| <= 1.12731e-09
+ * ensures: |next[0] / 2^29 - next_roll| <= 1.12729e-09
  * ensures: |next[1] / 2^29 - next_pitch| <= 5.65206e-09
- * ensures: |next[2] / 2^29 - next_heading| <= 6.18758e-09
+ * ensures: |next[2] / 2^29 - next_heading| <= 6.18756e-09
  * ensures: -1686629858 <= next[0..2] <= 1686629858
  */
 

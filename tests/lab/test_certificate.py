@@ -225,6 +225,18 @@ def test_a_band_bounds_nothing_for_a_pair():
         certify(run_of(choose_step("euler", "pair-1-5")), band_hz=10, amplitude_deg_s=900)
 
 
+@pytest.mark.parametrize("method", ["coning-compressed", "rk4"])
+def test_error_feedback_leaves_no_bias(method):
+    """A bias of a hundredth of a unit a step would be 30 units here; what feedback leaves is a few."""
+    choice = choose_step("euler", method, 1, previous=1) if method != "rk4" else choose_step("euler", method, 2)
+    random = motion("random", rate_deg_s=60)
+    count = choice.increments_per_step
+    samples = random.samples(Fraction(1, 100 * count), 0, 3000 * count + choice.previous)
+    made = backend(choice, backend="c-fixed32", settings=Settings(carry="full").fitted(np.abs(samples).max()))
+    certificate = certify(propagate(made, Recording(0.0, 0.01 / count, samples)), with_method=False)
+    assert certificate.largest_rounding_rad < 10 * made.unit
+
+
 # The method
 
 

@@ -68,6 +68,8 @@ from strapgen.ir.signals import CYCLE, Signal
 _WORSE = Fraction(101, 100)
 #: High words are taken where they cost no more than a sixtieth in error.
 _NARROWED = Fraction(61, 60)
+#: Part of a unit in the last place that values may be too low by on average, as they are rounded down.
+_BIAS = Fraction(1, 128)
 
 
 @dataclass(frozen=True)
@@ -132,10 +134,15 @@ def _high_words(planned: Planned) -> Quantization | None:
     # Where the rounding of the state comes back in the next call, what adds up is the error of the transition.
     limited = outputs if settings.carry == "none" else [*outputs, *transition]
     limits = {name: other.values[name].error * _NARROWED for name in limited if name in other.values}
+    # Over a run biases add up, where errors of rounding to the nearest do not, nor those that come back.
+    biases = dict(limits)
+    if program.attitude_step is not None or program.recursion is not None:
+        bias = _BIAS if settings.carry == "none" else Fraction(0)
+        biases = {name: bias / 2 ** other.values[name].fraction for name in limits}
 
     parted = with_exact_parts_apart(quantities, {*plan.words, *plan.forced})
     try:
-        narrowed = high_words(_walks(program, settings, plan), parted, limits)
+        narrowed = high_words(_walks(program, settings, plan), parted, limits, biases)
     except (InputError, ArithmeticError):  # a word is too short, or a coarse divisor may be zero
         return None
     if narrowed is not None:
