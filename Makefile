@@ -143,6 +143,7 @@ $(BENCH): pyproject.toml
 bench: $(BENCH)
 	.venv-bench/bin/python benchmarks/compare.py
 	.venv-bench/bin/python benchmarks/fixed_point.py
+	.venv-bench/bin/python benchmarks/high_products.py
 	.venv-bench/bin/python benchmarks/backends.py
 	.venv-bench/bin/python benchmarks/throughput.py
 	.venv-bench/bin/python benchmarks/waiting.py

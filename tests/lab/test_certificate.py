@@ -228,7 +228,9 @@ def test_a_band_bounds_nothing_for_a_pair():
 @pytest.mark.parametrize("method", ["coning-compressed", "rk4"])
 def test_error_feedback_leaves_no_bias(method):
     """A bias of a hundredth of a unit a step would be 30 units here; what feedback leaves is a few."""
-    choice = choose_step("euler", method, 1, previous=1) if method != "rk4" else choose_step("euler", method, 2)
+    choice = (
+        choose_step("euler", method, 1, previous=1) if method != "rk4" else choose_step("euler", method, 2)
+    )
     random = motion("random", rate_deg_s=60)
     count = choice.increments_per_step
     samples = random.samples(Fraction(1, 100 * count), 0, 3000 * count + choice.previous)

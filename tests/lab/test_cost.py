@@ -26,6 +26,8 @@ EXECUTED = {
     ("euler", "rv32imc"): 275,
     ("dcm", "cortex-m3"): 350,
 }
+#: Instructions of a call at most in 16 bits.
+SHORT = {("euler", "cortex-m3"): 140, ("euler", "cortex-m7"): 135}
 #: Instructions of a call at most where the high words of products are taken alone, or those from half words.
 HIGH_PRODUCTS = {
     ("high", "euler", "rv32imc"): 155,
@@ -65,6 +67,15 @@ def test_a_call_executes_few_instructions(kernel, cpu):
     assert 0 < measured.multiplications < measured.instructions
     assert measured.code_bytes >= 2 * measured.instructions
     assert measured.stack_bytes > 0
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(("kernel", "cpu"), SHORT)
+def test_a_call_in_16_bits_executes_few_instructions(kernel, cpu):
+    needed(cpu)
+    settings = Settings.of(word=16, max_rate_deg_s=400, step="0.01", increments=2)
+    sources = pipeline.generate(pipeline.lower(pipeline.derive(kernel)), "c-fixed", settings)
+    assert 50 < cost.cost(sources, cpu).executed <= SHORT[kernel, cpu]
 
 
 @pytest.mark.long

@@ -192,6 +192,21 @@ def test_a_window_of_four_filters():
     assert all(error < 4 * limit for error, limit in zip(found, (9.7e-8, 4.8e-6, 1.2e-6), strict=True)), found
 
 
+@pytest.mark.parametrize(("sloping", "size", "error"), [("rate", 0.002, 1e-6), ("force", 0.02, 2e-5)])
+def test_position_of_a_pair(sloping, size, error):
+    """Beside an integral over fine parts, of a rate or a force that is linear in time, and the other constant."""
+    c, a = size * np.array([[1, -2, 1], [0.5, 1, -1]]), np.array([[1.0, 2, -1], [2, -1, 1]])
+    (a if sloping == "rate" else c)[1] = 0
+    t = np.arange(-8, 10.0)[:, None]
+    increments = [np.diff(one[0] * t + one[1] * (t**2 - t), axis=0) for one in (c, a)]
+    _, position = strapgen.evaluator(choose("velocity-position", "pair-1-8"))(*increments)
+    ends = np.linspace(0, 1, 4001)[:, None]
+    s = (ends[1:] + ends[:-1]) / 2
+    turns = exponential(c[0] * s + c[1] * (s**2 - s) + np.cross(c[0], c[1]) * s**3 / 6)
+    force = (turns @ (a[0] + a[1] * (2 * s - 1))[..., None])[..., 0]
+    np.testing.assert_allclose(position, ((1 - s) * force).mean(0), atol=error)
+
+
 # Derivatives and covariance
 
 
@@ -255,6 +270,39 @@ def test_jacobians_are_derivatives_of_the_sums(window):
             (sides[0].position - sides[1].position) / (2 * step),
         ]
         np.testing.assert_allclose(factor.jacobian[:, k], np.concatenate(columns), atol=1e-7)
+
+
+def test_a_step_carries_the_covariance_on_by_its_derivatives():
+    """Differences by the errors before it and by samples that all change alike, which the sum of the filters takes."""
+    kernel = strapgen.evaluator(choose("preintegrate", "pair-1-5"))
+    rng = np.random.default_rng(8)
+    angles, velocities = rng.uniform(-0.03, 0.03, (11, 3)), rng.uniform(-0.1, 0.1, (11, 3))
+    r, (v, p) = exponential(rng.uniform(-1, 1, 3)), rng.uniform(-1, 1, (2, 3))
+    root, noise = rng.uniform(-1, 1, (9, 9)), rng.uniform(0.5, 1, 6)
+    before = root @ root.T
+    rows = np.triu_indices(9)
+
+    def stepped(x, covariance=before):
+        """Return what follows from errors (rotation, velocity, position, rate, force)."""
+        return kernel(
+            angles + x[9:12],
+            velocities + x[12:],
+            0.1,
+            *(r @ exponential(x[:3]), v + x[3:6], p + x[6:9]),
+            *np.zeros((5, 3, 3)),
+            *(covariance[rows], noise[:3], noise[3:]),
+        )
+
+    exact = stepped(np.zeros(15))
+    step, columns = 1e-5, []
+    for k in range(15):
+        one, other = (stepped(sign * step * np.eye(15)[k]) for sign in (1, -1))
+        turns = [logarithm(exact[0].T @ side[0]) for side in (one, other)]
+        parts = turns[0] - turns[1], one[1] - other[1], one[2] - other[2]
+        columns.append(np.concatenate(parts) / (2 * step))
+    a, b = np.transpose(columns[:9]), np.transpose(columns[9:])
+    after = a @ before @ a.T + b @ np.diag(noise) @ b.T
+    np.testing.assert_allclose(exact[8], after[rows], atol=1e-8)
 
 
 def test_other_biases_need_no_second_pass():

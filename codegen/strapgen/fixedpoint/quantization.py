@@ -98,7 +98,7 @@ def planned(program: Program, settings: Settings) -> Planned:
 def finished(planned: Planned) -> FixedProgram:
     """Return the program, with sums narrowed to high words where that saves operations, and with its accumulation."""
     context, fixed = planned.context, planned.fixed
-    if not context.settings.digits and context.settings.multiply != "high":
+    if not context.settings.digits and context.settings.multiply not in LOST:
         narrowed = _high_words(planned)
         if narrowed is not None:
             program_of = _fixed_program(narrowed)

@@ -93,7 +93,7 @@ def certify(
     ] = 1,
     output: Output,
 ) -> None:
-    """Certify what rounding and the method did to the attitude on a recorded run.
+    """Certify the error of rounding and method on a recorded run.
 
     A header's bound holds for every input; here the states are compared with exact arithmetic on the increments of this
     run, in numbers with a radius. The states are those of the code as it runs here, or those that a processor logged. A

@@ -25,7 +25,7 @@ REGISTRATION = Registration(
         "certify": Command(
             f"{__package__}.certify_command:certify",
             "Analyse",
-            summary="Certify what rounding and the method did to the attitude on a recorded run",
+            summary="Certify the error of rounding and method on a recorded run",
         ),
         "converge": Command(
             f"{__package__}.converge_command:converge",

@@ -9,8 +9,8 @@ Jacobian J(phi) nu = nu + (1 - cos x)/x^2 phi x nu + (x - sin x)/x^3 phi x (phi 
 
 The position changes by the integral of (1 - t) R f times the step: it is the velocity for the force (1 - t) f, whose
 samples are linear in those of f. A pair is right where rate and force have one frequency, as in sculling, and its
-position is half its velocity, the integral for the middle of the step, and what is odd about the middle, to second
-order in the rate: -a1/6 - c0 x (a0 + a1)/12 - c0 x (c0 x (a0/24 + a1/30)).
+position is half its velocity, the integral for the middle of the step, and what is odd about the middle:
+-a1/6 - c0 x (a0 + a1)/12 - c0 x (c0 x (a0/24 + a1/30)), of which c1 x a1/60 and higher coefficients are left out.
 """
 
 from __future__ import annotations
