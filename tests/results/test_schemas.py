@@ -32,6 +32,7 @@ COMMANDS = {
     "simulate two-speed-euler --motion constant --set y_deg_s=10 --duration 1": "run",
     "simulate dcm --recording tests/data/increments.csv --title a": "attitude",
     "log tests/data/increments.csv": "log",
+    "certify euler --recording tests/data/increments.csv": "certificate",
     f"compare euler --method rk1,rk2 --backend numpy,c {RUN}": "comparison",
     "compare euler,dcm --method rk1 --recording tests/data/increments.csv": "spread",
     "converge euler --method rk1 --steps 1/2,1/4 --duration 1 --backend numpy": "convergence",
