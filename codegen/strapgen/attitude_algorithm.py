@@ -52,7 +52,7 @@ class AttitudeAlgorithm:
     --------
     >>> alg = algorithm("euler", "rk4", increments=2)
     >>> alg.formulas.operations["multiply"], alg.derive().order.step
-    (38, 4)
+    (37, 4)
     """
 
     choice: Choice
@@ -89,7 +89,7 @@ class AttitudeAlgorithm:
         >>> print(str(formulas).splitlines()[0])
         Euler parameters: step by classical fourth-order Runge-Kutta method from 2 angle increments
         >>> formulas.operations["multiply"], formulas.latex.splitlines()[0]
-        (38, '\\begin{align*}')
+        (37, '\\begin{align*}')
         """
         from strapgen.results.display.formulas import Formulas  # loads SymPy
 
@@ -112,7 +112,7 @@ class AttitudeAlgorithm:
         Examples
         --------
         >>> algorithm("euler", "rk4", increments=2).program().operations["multiply"]
-        38
+        37
         """
         return pipeline.program(self.choice)
 

@@ -91,7 +91,7 @@ class Comparison(ReadOnly, Record):
     --------
     >>> (row,) = compare("euler", "rk4", 2, ["numpy"], np.full((5, 2, 3), 0.01))
     >>> row.backend, row.max_abs_rad, row.operations["multiply"]
-    ('numpy', 0.0, 38)
+    ('numpy', 0.0, 37)
     """
 
     backend: str = field(metadata=entry("back end", align="<"))

@@ -351,6 +351,7 @@ def filtered(response: Response, interval: float) -> _LinearRecursion:
 
     `interval`: in s.
 
+    >>> from fractions import Fraction
     >>> gyro = Response(frequency_hz=Fraction(80), damping=Fraction(7, 10))
     >>> filtered(gyro, 0.001).run(np.ones(3), np.array([1.0, 0.0]))[0].round(12)
     array([1., 1., 1.])

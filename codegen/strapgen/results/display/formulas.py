@@ -93,7 +93,7 @@ def operations_as_text(kernel: Kernel, program: Program) -> str:
     >>> from strapgen import algorithm
     >>> alg = algorithm("euler", "rk4", increments=2)
     >>> print(operations_as_text(alg.derive(), alg.program()).splitlines()[-1])
-      temporaries    14
+      temporaries    15
     """
     columns = (Column(align="<", least=12), Column(least=5, gap=0))
     return "\n".join([kernel.name, *TextTable(columns, _counts(program)).lines("  ")])
@@ -133,7 +133,7 @@ class KernelResult(Result):
     >>> from strapgen import algorithm
     >>> alg = algorithm("euler", "rk4", increments=2)
     >>> KernelResult.of(alg.derive(), alg.program()).temporaries
-    14
+    15
     """
 
     of_kernel: Kernel = field(metadata=INTERNAL)
@@ -228,7 +228,7 @@ class Formulas:
     --------
     >>> from strapgen import algorithm
     >>> algorithm("euler", "rk4", increments=2).formulas.operations["add"]
-    30
+    31
     """
 
     kernel: Kernel
@@ -277,7 +277,7 @@ def program_as_data(program: Program) -> dict[str, str]:
     --------
     >>> from strapgen import algorithm
     >>> len(program_as_data(algorithm("euler", "rk4", increments=2).program()))
-    18
+    19
     """
     printer = ExactPrinter()
     return {assignment.name: printer.text(assignment.value) for assignment in program.body}
