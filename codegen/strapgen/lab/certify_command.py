@@ -125,7 +125,9 @@ def certify(
             jobs=jobs,
             instants=None if states is not None else 400,
         )
-    result = replace(result, source=source.source if states is None else f"{states} along {source.source}")
+    result = replace(result, source=source.source)
+    if states is not None:
+        result = replace(result, backend=target, source=f"{states} along {source.source}")
     output.show(result)
     if result.faults:
         raise typer.Exit(1)
