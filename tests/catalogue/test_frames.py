@@ -23,6 +23,18 @@ WITHOUT = {
     **dict.fromkeys(
         (
             *("state_jacobian", "increments_jacobian", "right_noise", "left_noise"),
+            *(
+                "rotation_by_rate",
+                "velocity_by_rate",
+                "velocity_by_force",
+                "position_by_rate",
+                "position_by_force",
+            ),
+            *(
+                "covariance",
+                *(f"next_{part}_by_{by}" for part in ("velocity", "position") for by in ("rate", "force")),
+            ),
+            *("next_rotation_by_rate", "next_covariance"),
             *("rotation_vector_by_increments", "sculling_by_increments", "sculling_by_velocity_increments"),
             *(
                 f"{part}_change_by_{by}"

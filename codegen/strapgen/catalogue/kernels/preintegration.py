@@ -121,10 +121,15 @@ class _Sums:
                 "R",
                 meaning="rotation since the first instant, body axes to those then, by rows",
                 constraint="rotation",
+                frame="b to n",
             ),
             *(
                 Signal.vector(
-                    part, part, unit=PARTS[part], meaning=f"{part} since the first instant, {frame}"
+                    part,
+                    part,
+                    unit=PARTS[part],
+                    meaning=f"{part} since the first instant, {frame}",
+                    frame="n",
                 )
                 for part in ("velocity", "position")
             ),
@@ -159,6 +164,7 @@ class _Sums:
                     f"{bias}_noise",
                     unit=unit,
                     meaning=f"variance of the noise of the {what} over the step, each axis",
+                    frame="b",
                 )
             )
             for bias, unit, what in (
