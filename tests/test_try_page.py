@@ -172,7 +172,7 @@ def test_page_derives_as_the_command_line(runnable, browser, tmp_path):
         for width in WIDTHS:
             page.set_viewport_size({"width": width, "height": HEIGHT})
             assert window.view().faults() == [], width
-        assert page.locator("#try-cost").inner_text().split()[:4] == ["order", "4", "multiplications", "38"]
+        assert page.locator("#try-cost").inner_text().split()[:4] == ["order", "4", "multiplications", "37"]
         _compare(window)
         _own(window)
         _refuse(window)

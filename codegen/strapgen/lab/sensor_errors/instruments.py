@@ -100,7 +100,8 @@ class TriadErrors(ReadOnly):
             several = second_order(bandwidth_hz, damping)
         late = np.array([float(one.delay_s) for one in several])
         object.__setattr__(self, "delay", self.delay + late)
-        object.__setattr__(self, "response", tuple(replace(one, delay_s=Fraction(0)) for one in several))
+        prompt = tuple(replace(one, delay_s=Fraction(0)) for one in several)
+        object.__setattr__(self, "response", prompt[0] if len({*prompt}) == 1 else prompt)
         super().__post_init__()
 
     @property
