@@ -54,6 +54,8 @@ def written(value: Any) -> str:
         return f"[{inside}]" if isinstance(value, list) else f"({inside}{',' * (len(value) == 1)})"
     if callable(value) and hasattr(value, "__name__"):
         return str(value.__name__)
+    if dataclasses.is_dataclass(value):  # as it shows itself, not all fields
+        return repr(value)
     return object_description(value)
 
 

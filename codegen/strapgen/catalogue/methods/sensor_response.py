@@ -29,6 +29,7 @@ from strapgen.catalogue.toml_models import Key
 from strapgen.ir import checks
 from strapgen.ir.checks import counted
 from strapgen.ir.exceptions import InputError
+from strapgen.ir.notebook_display import short_repr
 from strapgen.ir.renamed import renamed
 from strapgen.storage import streams
 
@@ -124,6 +125,8 @@ class Response:
         str, Key("A sample is the integral over its interval, or the rate as that begins", choices=INPUTS)
     ] = INPUTS[0]
     sample_hz: Annotated[Fraction | None, Key("Sampling frequency", "Hz", above=0)] = None
+
+    __repr__ = short_repr
 
     #: Keys of files of before, by those in their place
     OLD_KEYS: ClassVar[dict[str, str]] = {"bandwidth_hz": "frequency_hz"}
