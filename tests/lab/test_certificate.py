@@ -159,6 +159,19 @@ def test_a_unit_in_the_last_place_moves_the_certificate_by_that_unit(element):
     assert apart < turned + 2 * made.angle_bound(60)
 
 
+@pytest.mark.parametrize("algorithm", ["euler", "dcm", "cayley-klein"])
+def test_a_normalization_is_no_fault(algorithm):
+    """It lies in intervals that are shorter than the time from one to the next."""
+    samples = turns(400)
+    made = backend(algorithm, backend="c-fixed32", settings=Settings().fitted(np.abs(samples).max()))
+    run = propagate(made, Recording(0.0, 0.01, samples), orthonormalize="0.04")
+    certificate = certify(run, with_method=False)
+    assert certificate.faults == []
+    wrong = np.array(run.states)
+    wrong[101:] = made.propagate(samples[202:].reshape(-1, 2, 3), initial=wrong[101] + 2.0**-18)
+    assert certify(replace(run, states=wrong), with_method=False).faults
+
+
 def test_a_flipped_bit_is_found_with_its_time():
     run = run_of(choose_step("euler", "rk4", 2), every=1, carry="none")
     states = np.array(run.states)

@@ -161,7 +161,7 @@ def _run(
     if states is not None:
         if intervals.initial is not None:
             raise InputError("--initial-deg does not go with --states, which has the attitude at its start")
-        return read_states(states, made, data)
+        return read_states(states, made, data, intervals.orthonormalize)
     with waiting(f"running {made.kernel}"):
         return recording.propagate(made, data, intervals.orthonormalize, None, made.count, intervals.start())
 

@@ -423,7 +423,7 @@ def _joined(
     faults = []
     with ctx.workprec(BITS):
         for k, (block, length) in enumerate(zip(blocks, np.diff(places).tolist(), strict=True)):
-            alone, limit = Angle.of(block.rounding), bound(length)
+            alone, limit = Angle.of(block.rounding), _limit(run, bound, int(places[k]), length)
             if limit is not None and not alone.size - alone.radius <= limit:
                 faults.append(Fault(float(run.time[k]), float(run.time[k + 1]), alone.size, limit))
             rounding = block.rounding * rounding
@@ -484,6 +484,18 @@ def _shape(matrix: Any) -> tuple[tuple[float, ...], tuple[float, ...]]:
     scale = tuple(float(matrix[i, i] - 1) for i in range(3))
     skew = tuple(float(matrix[i, j] + matrix[j, i]) / 2 for i, j in ((1, 2), (2, 0), (0, 1)))
     return scale, skew
+
+
+def _limit(run: History, bound: Callable[[int], float | None], first: int, steps: int) -> float | None:
+    """Return the most that rounding makes in some steps, of which the first follows `first` others; None if not known.
+
+    An orthonormalization of a matrix removes skew, of which no header tells how far it turns the attitude.
+    """
+    assert run.taken is not None
+    every = run.taken.orthonormalize_every
+    if not every or first // every == (first + steps) // every:
+        return bound(steps)
+    return None if run.states.ndim > 2 else bound((steps // every + 1) * every)
 
 
 def _header_bound(run: History) -> Callable[[int], float | None]:

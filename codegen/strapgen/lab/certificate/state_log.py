@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from strapgen.ir.exceptions import InputError
 from strapgen.lab.recordings.log_file import LogFile, open_log
 from strapgen.lab.recordings.log_topic import LogTopic, split_topic
-from strapgen.lab.recordings.recording import History, Recording, Taken
+from strapgen.lab.recordings.recording import History, Recording, Taken, record_interval
 from strapgen.run.backends import Backend
 from strapgen.run.evaluators import numbers
 
@@ -17,12 +18,16 @@ from strapgen.run.evaluators import numbers
 TIMES = ("time_s", "t", "time", "time [s]", "t [s]")
 
 
-def read_states(path: str | Path, backend: Backend, recording: Recording) -> History:
+def read_states(
+    path: str | Path, backend: Backend, recording: Recording, orthonormalize: Any = None
+) -> History:
     """Return the states of a log as a run along a recording.
 
     The log is a table of any format with a column of times in s, on the clock of the recording, and one for each
     element of the state, by its name in the generated code. In fixed point they are words, in the formats of the
     header; rows may stand any number of steps apart.
+
+    `orthonormalize`: time from one orthonormalization of the processor to the next in s.
     """
     place, topic = split_topic(str(path))
     log = open_log(place)
@@ -51,7 +56,9 @@ def read_states(path: str | Path, backend: Backend, recording: Recording) -> His
         values = numbers(state, values)
     step = recording.interval * backend.increments
     states = values.reshape(len(values), *backend.state_shape)
-    return History(stamps, states, step, 0, backend.elements, backend, taken=Taken(recording))
+    every = 0 if orthonormalize is None else record_interval("orthonormalize", orthonormalize, step)
+    taken = Taken(recording, backend.count, every)
+    return History(stamps, states, step, 0, backend.elements, backend, taken=taken)
 
 
 def _table(log: LogFile, topic: str, backend: Backend) -> tuple[LogTopic, str]:
