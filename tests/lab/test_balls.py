@@ -25,6 +25,15 @@ def test_the_rotation_of_a_stretched_matrix_is_that_of_the_nearest_rotation():
     assert [float(value) for value in (x, y, z)] == pytest.approx([0, 0, 0.1], rel=1e-13, abs=1e-15)
 
 
+def test_the_rotation_of_a_wide_matrix_holds_that_of_every_matrix_in_it():
+    with flint.ctx.workprec(128):
+        c, s = flint.arb(0.1).cos(), flint.arb(0.1).sin()
+        turn = [x + flint.arb(0, 1e-6) for x in (c, -s, 0, s, c, 0, 0, 0, 1)]
+        *_, z = balls.rotation_vector(flint.arb_mat(3, 3, turn))
+        assert z.contains(0.1 + 0.9e-6)
+        assert z.contains(0.1 - 0.9e-6)
+
+
 def test_a_ball_holds_a_third():
     assert balls.ball(Fraction(1, 3)).contains(flint.fmpq(1, 3))
 

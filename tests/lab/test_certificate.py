@@ -18,6 +18,7 @@ from strapgen.catalogue import choose_step
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.program import OPERATIONS
 from strapgen.lab.certificate import balls, band_bound
+from strapgen.lab.certificate import certificate as certificate_module
 from strapgen.lab.motions.rate_expressions import time_symbol
 from strapgen.lab.motions.rate_motion import RateMotion
 
@@ -355,6 +356,22 @@ def test_a_level_is_above_the_distance_of_a_filter_at_any_frequency(m, frequency
     assert level <= largest * 1.05 + 1e-14
 
 
+@pytest.mark.parametrize("m", [1, 2, 3])
+def test_what_is_missed_turns_by_no_more_than_the_bound(m):
+    """At a constant rate about x and a Legendre polynomial about y: products of m + 1 factors lead."""
+    rate, missed = 0.2, 1e-9
+    bound = band_bound.BandBound(np.ones((1, 1)), np.where(np.arange(32) == m, missed, 0.0))
+    times, weights = np.polynomial.legendre.leggauss(40)
+    size = missed * np.polynomial.legendre.Legendre.basis(m)(times)
+    turned = rate * (times + 1) / 2  # of y into z
+    along = [weights @ (size * turn(turned)) / 2 for turn in (np.cos, np.sin)]
+    angle = np.hypot(*along)
+    (found,) = bound.angles(np.array([[[rate, 0.0, 0.0]]]))
+    assert angle <= found
+    if m < 3:  # then nearly all of the bound is of these products
+        assert found < 1.5 * angle
+
+
 def test_factors_are_integrals_of_legendre_polynomials():
     import sympy as sp
 
@@ -381,6 +398,15 @@ def test_a_rotation_vector_is_held_at_every_size():
             assert abs(z - angle) < 1e-30 + 1e-15 * angle * angle
             assert (z - angle).contains(0)
         assert not balls.rotation_vector(flint.arb_mat(3, 3, [0, -1, 0, 1, 0, 0, 0, 0, 1]) * 1)[2].is_finite()
+
+
+def test_a_long_run_is_certified_in_parts(monkeypatch):
+    run = run_of(choose_step("euler", "window-3-3"))
+    whole = certify(run)
+    monkeypatch.setattr(certificate_module, "_TOGETHER", 30)
+    parts = certify(run)
+    assert parts.rounding_axes_rad == whole.rounding_axes_rad
+    assert parts.truncation_rad == pytest.approx(whole.truncation_rad, rel=1e-12)  # series end where they may
 
 
 def test_an_interrupted_certificate_goes_on_to_the_same(tmp_path):
