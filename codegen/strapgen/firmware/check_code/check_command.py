@@ -13,7 +13,7 @@ from strapgen.cli import terminal
 from strapgen.cli.option_groups import Shown, grouped, stated
 from strapgen.cli.options import STEP_OPTIONS, CheckedAlgorithm, MethodOptions, option
 from strapgen.cli.output import TEXT_OUTPUT, Output
-from strapgen.cli.values import Positive
+from strapgen.cli.values import Positive, Vector
 from strapgen.ir.exceptions import InputError
 
 if TYPE_CHECKING:
@@ -80,6 +80,24 @@ class ForeignOptions:
             "[default: 100]",
         ),
     ] = None
+    gravity_m_s2: Annotated[
+        Vector | None,
+        option(
+            "--gravity-m-s2",
+            metavar="X,Y,Z",
+            help="Gravity in reference axes that it adds to the velocity.  [default: none; 0,0,-9.80665 for an "
+            "argument gravity]",
+        ),
+    ] = None
+    frame_rate_rad_s: Annotated[
+        Vector | None,
+        option(
+            "--frame-rate-rad-s",
+            metavar="X,Y,Z",
+            help="Rate of its reference axes against inertial space, in these axes.  [default: none; that of north, "
+            "east, down at 45 deg of latitude for an argument frame_rate]",
+        ),
+    ] = None
     init: Annotated[
         _Text,
         option("--init", metavar="NAME", help="Name of the function that begins a run, if there is one."),
@@ -96,7 +114,7 @@ class ForeignOptions:
 
     def step(self, file: str) -> ForeignStep:
         """Return the function of a file, compiled."""
-        from strapgen.firmware.check_code.foreign import Convention, ForeignStep
+        from strapgen.firmware.check_code.foreign import INTERVAL, Convention, ForeignStep
         from strapgen.firmware.check_code.foreign_arguments import RATES
 
         source = self._source(file)
@@ -107,9 +125,12 @@ class ForeignOptions:
             )
         convention = Convention(self.scalar or "last", self.sense or "body-to-reference")
         takes = self.input or ("rates" if arguments.named(RATES) else "increments")
-        if self.sample_hz is None:
-            return ForeignStep(source, convention, takes)
-        return ForeignStep(source, convention, takes, 1 / self.sample_hz)
+        interval = INTERVAL if self.sample_hz is None else 1 / self.sample_hz
+        gravity, frame = (
+            None if vector is None else tuple(map(float, vector))
+            for vector in (self.gravity_m_s2, self.frame_rate_rad_s)
+        )
+        return ForeignStep(source, convention, takes, interval, gravity, frame)
 
     def _source(self, file: str) -> ForeignSource | InterpretedSource:
         """Return the function with its arguments."""

@@ -74,13 +74,13 @@ class InterpretedSource:
 
     @property
     def _parameters(self) -> list[tuple[str, list[int]]]:
-        """Names and shapes of what it is called with."""
-        arguments, result = self.arguments, self.arguments.result
-        returned = result if result.name not in ("state",) else None
+        """Names and shapes of what it is called with; results that it returns are none of them."""
+        arguments = self.arguments
+        returned = [each for each in arguments.results if arguments.before(each) != each]
         return [
             (each.name, list(each.shape))
             for each in arguments.parameters
-            if not each.type and each is not returned
+            if not each.type and each not in returned
         ]
 
     def _command(self) -> list[str]:
@@ -89,14 +89,19 @@ class InterpretedSource:
         return _PYTHON
 
     def _plan(self) -> str:
-        result = self.arguments.result
+        arguments = self.arguments
+        held = [arguments.before(result) for result in arguments.results]
         plan = _place(self.file) | {
             "function": self.function,
             "init": self.init,
             "type": self.precision,
             "parameters": self._parameters,
             "names": self.names,
-            "result": [result.name, list(result.shape)],
+            "fed": [(each.name, each.size) for each in arguments.fed],
+            "results": [
+                (each.name, each.size, before.name if before else "")
+                for each, before in zip(arguments.results, held, strict=True)
+            ],
         }
         return json.dumps(plan)
 

@@ -18,6 +18,9 @@ function array = arranged(numbers, shape)
         array = numbers(:);
     end
 end
+function shape = shape_of(array)
+    shape = size(array);
+end
 function run(folder, calls)
     plan = jsondecode(fileread(fullfile(folder, 'plan')), 'makeValidName', false);
     addpath(plan.folder);
@@ -40,32 +43,36 @@ function run(folder, calls)
                 feval(plan.init);
             end
         end
-        given = cell(1, count);
+        known = struct('dt', row(2), 'step', row(3));
         place = 4;
-        for name = {'previous', 'increments', 'rates'}
-            for n = 1:count
-                if strcmp(plan.parameters{n}{1}, name{1})
-                    shape = plan.parameters{n}{2};
-                    given{n} = cast(arranged(row(place:place + prod(shape) - 1), shape), kind);
-                    place = place + prod(shape);
-                end
-            end
+        for n = 1:numel(plan.fed)
+            size = plan.fed{n}{2};
+            known.(plan.fed{n}{1}) = row(place:place + size - 1);
+            place = place + size;
         end
+        place = 1;
+        for n = 1:numel(plan.results)
+            size = plan.results{n}{2};
+            if ~isempty(plan.results{n}{3})
+                known.(plan.results{n}{3}) = state(place:place + size - 1);
+            end
+            place = place + size;
+        end
+        given = cell(1, count);
         for n = 1:count
-            switch plan.parameters{n}{1}
-                case 'state'
-                    given{n} = arranged(state, plan.parameters{n}{2});
-                    if numel(plan.parameters{n}{2}) == 2
-                        given{n} = given{n}.';
-                    end
-                case 'dt'
-                    given{n} = row(2);
-                case 'step'
-                    given{n} = row(3);
+            name = plan.parameters{n}{1};
+            shape = plan.parameters{n}{2};
+            given{n} = known.(name);
+            if numel(shape) > 0
+                given{n} = cast(arranged(known.(name), shape), kind);
+            end
+            if numel(shape) == 2 && strcmp(name, 'state')
+                given{n} = given{n}.';
             end
         end
+        returned = {};
         try
-            returned = feval(plan.function, given{:});
+            [returned{1:numel(plan.results)}] = feval(plan.function, given{:});
         catch caught
             text = regexprep(caught.message, '\s+', ' ');
             if strncmp(text, 'parse error', 11)
@@ -77,15 +84,20 @@ function run(folder, calls)
             end
             return;
         end
-        if ~isnumeric(returned) || numel(returned) ~= numel(identity)
-            put(fullfile(folder, 'refused'), sprintf('%s gives an array of the shape [%s]; %d numbers are needed', ...
-                plan.function, num2str(size(returned)), numel(identity)));
-            return;
+        state = [];
+        for n = 1:numel(plan.results)
+            part = returned{n};
+            size = plan.results{n}{2};
+            if ~isnumeric(part) || numel(part) ~= size
+                put(fullfile(folder, 'refused'), sprintf('%s gives an array of the shape [%s]; %d numbers are needed', ...
+                    plan.function, num2str(shape_of(part)), size));
+                return;
+            end
+            if size == 9 && shape_of(part)(1) == 3
+                part = part.';
+            end
+            state = [state; cast(part(:), kind)];
         end
-        if numel(identity) == 9 && size(returned, 1) == 3
-            returned = returned.';
-        end
-        state = cast(returned(:), kind);
         outputs(:, k) = double(state);
     end
     out = fopen(fullfile(folder, 'output'), 'w');

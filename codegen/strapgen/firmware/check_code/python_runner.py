@@ -114,30 +114,29 @@ def _call(folder: Path, plan: dict[str, Any], module: Any, owner: Any, function:
     identity = np.fromfile(folder / "identity").astype(kind)
     rows = np.fromfile(folder / "input").reshape(calls, -1)
     outputs = np.empty((calls, identity.size))
-    parameters, (result, _) = plan["parameters"], plan["result"]
-    sizes = {name: int(np.prod(shape)) for name, shape in parameters}
-    place = 3
-    where = {}
-    for name in ("previous", "increments", "rates"):
-        if name in sizes:
-            where[name] = slice(place, place := place + sizes[name])
-    state, target, changed = identity, module, False
-    as_rotation = _takes_rotation(function, plan)
+    ends = np.cumsum([3, *(size for _, size in plan["fed"])])
+    places = {name: slice(*ends[n : n + 2]) for n, (name, _) in enumerate(plan["fed"])}
+    ends = np.cumsum([0, *(size for _, size, _ in plan["results"])])
+    as_rotation, changed, target = _takes_rotation(function, plan), False, module
+    state = identity
     for number, row in enumerate(rows):
         try:
             if row[0]:
                 state, target = _begin(plan, module, owner, identity)
-            scalars = {"dt": float(row[1]), "step": float(row[2])}
-            given: list[Any] = []
-            for name, shape in parameters:
-                part = state if name == "state" else row[where[name]] if name in where else None
-                given.append(scalars[name] if part is None else np.array(part, kind).reshape(shape))
+            known = {name: row[place] for name, place in places.items()}
+            known |= {held: state[slice(*ends[n : n + 2])] for n, (_, _, held) in enumerate(plan["results"])}
+            known |= {"dt": row[1], "step": row[2]}
+            given: list[Any] = [
+                np.array(known[name], kind).reshape(shape) if shape else float(known[name])
+                for name, shape in plan["parameters"]
+            ]
+            before = [each.copy() if isinstance(each, np.ndarray) else each for each in given]
+            by_name = {name: each for (name, _), each in zip(plan["parameters"], given, strict=True)}
             if as_rotation:
-                given[[name for name, _ in parameters].index("state")] = as_rotation(state)
+                given[[*by_name].index("state")] = as_rotation(known["state"])
             bound = getattr(target, plan["function"].rpartition(".")[2]) if owner is not None else function
             if not number:
                 _require_fit(plan, bound, given)
-            before: list[Any] = [each.copy() if isinstance(each, np.ndarray) else each for each in given]
             named = dict(zip(plan["names"], given, strict=True)) if plan["names"] else {}
             returned = bound(**named) if named else bound(*given)
         except _RefusedError:
@@ -145,20 +144,38 @@ def _call(folder: Path, plan: dict[str, Any], module: Any, owner: Any, function:
         except BaseException as error:
             _write(folder / "stopped", f"it raises {_said(error)}")
             return
-        read = returned
-        if result.startswith(("self.", "global ")):
-            holder = target if result.startswith("self.") else module
-            path = result.removeprefix("self.").removeprefix("global ")
-            read = _attribute(holder, path)
-        elif returned is None and result == "state":
-            read = given[[name for name, _ in parameters].index("state")]
-        outputs[number] = _numbers(plan, read, identity.size)
+        outputs[number] = np.concatenate(_results(plan, module, target, returned, by_name))
         state = outputs[number].astype(kind)
-        for (name, _), after, kept in zip(parameters, given, before, strict=True):
-            in_place = name == "state" and returned is None
-            changed |= not in_place and isinstance(after, np.ndarray) and after.tobytes() != kept.tobytes()
+        in_place = [held for name, _, held in plan["results"] if name == held and returned is None]
+        changed |= any(
+            isinstance(after, np.ndarray) and name not in in_place and after.tobytes() != kept.tobytes()
+            for (name, _), after, kept in zip(plan["parameters"], given, before, strict=True)
+        )
     outputs.tofile(folder / "output")
     _write(folder / "flags", str(2 * changed))
+
+
+def _results(
+    plan: dict[str, Any], module: Any, target: Any, returned: Any, given: dict[str, Any]
+) -> list[Any]:
+    """Return the numbers of all results: returned, several as a tuple, or changed in place, or read afterwards."""
+    returns = [name for name, _, _ in plan["results"] if not name.startswith(("self.", "global "))]
+    if len(returns) > 1 and returned is not None:
+        if not isinstance(returned, tuple | list) or len(returned) != len(returns):
+            raise _RefusedError(f"{plan['function']} is to return a tuple of {', '.join(returns)}")
+        several = dict(zip(returns, returned, strict=True))
+    else:
+        several = dict.fromkeys(returns, returned)
+    numbers = []
+    for name, size, held in plan["results"]:
+        if name.startswith("self."):
+            read = _attribute(target, name.removeprefix("self."))
+        elif name.startswith("global "):
+            read = _attribute(module, name.removeprefix("global "))
+        else:
+            read = given[name] if returned is None and name == held else several[name]
+        numbers.append(_numbers(plan, read, size))
+    return numbers
 
 
 def _takes_rotation(function: Any, plan: dict[str, Any]) -> Any:
