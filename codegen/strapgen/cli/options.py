@@ -82,7 +82,8 @@ RunAlgorithm = Annotated[
 CheckedAlgorithm = Annotated[
     str,
     _argument(
-        "dcm, euler or cayley-klein, a file in Python, C, C++ or MATLAB, or package.module:function.",
+        "dcm, euler or cayley-klein, or a Python file of your own, one in C, C++ or MATLAB, "
+        "or package.module:function.",
         _STEPS,
     ),
 ]
