@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import io
+import re
 import zipfile
 from collections.abc import Mapping
 from functools import cache
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -14,6 +16,7 @@ from c_programs import complaints, needed
 
 from strapgen import TwoSpeed, pipeline, read_system
 from strapgen.catalogue import Choice, choose
+from strapgen.cli import main
 from strapgen.firmware.fmu import archive, units
 from strapgen.firmware.fmu.units import Unit
 from strapgen.ir.exceptions import InputError
@@ -30,6 +33,7 @@ from fmpy.fmi2 import FMU2Slave  # noqa: E402
 from fmpy.fmi3 import FMU3Slave  # noqa: E402
 from fmpy.validation import validate_fmu  # noqa: E402
 
+ROOT = Path(__file__).resolve().parents[2]
 STEPS = 40
 FULL = Settings(carry="full")
 GYRO = Settings.of(sample_hz=100, lsb="0.0175dps", carry="full", increments=2)
@@ -527,7 +531,63 @@ def test_integers_of_32_bits_are_too_few_for_longer_words():
     assert 'Int64 name="increments"' in archive.source_files(unit, 3)["modelDescription.xml"]
 
 
-# The archive
+# The archive and the commands
+
+
+def test_the_page_runs_as_it_says(tmp_path, monkeypatch, capsys):
+    needed("cc")
+    page = (ROOT / "docs" / "fmu.md").read_text()
+    monkeypatch.chdir(tmp_path)
+    command, *_ = re.findall(r"^    (strapgen .*)$", page, re.MULTILINE)
+    with pytest.raises(SystemExit) as stop:
+        main(command.split()[1:])
+    assert stop.value.code == 0
+    assert "firmware/euler_rk4_2.fmu2.fmu" in capsys.readouterr().out
+    (code,) = re.findall(r"^```python\n(.*?)^```", page, re.MULTILINE | re.DOTALL)
+    exec(code, {})
+    assert capsys.readouterr().out == f"{np.sin(0.5):.6f} {np.sin(1):.6f}\n"
+
+
+@pytest.mark.parametrize(
+    ("command", "said"),
+    [
+        ("generate euler --target c --project fmu", "fmu2 or fmu3|fmu2, fmu3"),
+        ("generate euler --target numpy --project fmu2", "targets in C, not with numpy"),
+        ("generate euler --target c-fixed --word 64 --project fmu2", "need --project fmu3"),
+        (
+            "generate euler --target c --with-runs --project fmu3",
+            "--with-runs does not go with --project fmu3",
+        ),
+    ],
+)
+def test_bad_input_gets_one_line(command, said, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(SystemExit) as stop:
+        main(command.split())
+    printed = capsys.readouterr().err
+    assert stop.value.code == 2 and printed.count("\n") == 1 and re.search(said, printed)
+    assert not [*tmp_path.iterdir()]
+
+
+def test_a_unit_is_written_checked_and_not_written_over(tmp_path, monkeypatch, capsys):
+    needed("cc")
+    command = ["generate", "euler", "--target", "c", "--project", "fmu3", "--out", str(tmp_path)]
+
+    def status(*words: str) -> int:
+        with pytest.raises(SystemExit) as stop:
+            main([*command, *words])
+        return int(str(stop.value.code))
+
+    assert status() == 0
+    (path,) = tmp_path.iterdir()
+    whole = path.read_bytes()
+    assert status("--check") == 0
+    path.write_bytes(whole[:-1])
+    assert status("--check") == 1
+    assert "Binary files" in capsys.readouterr().out
+    assert status() == 2 and path.read_bytes() == whole[:-1]
+    assert "differs from what --project writes" in capsys.readouterr().err
+    assert status("--force") == 0 and path.read_bytes() == whole
 
 
 @pytest.mark.parametrize("kind", archive.VERSIONS)

@@ -155,14 +155,8 @@ def coning_run(sources: Sources, conversion: str) -> MotionRun:
     if sources.fixed is not None:
         argument = sources.fixed.inputs[-1]
         largest = argument.high * argument.unit / PART
-        step = stated_step(sources.fixed.settings)
+        step = units.stated_step(sources.fixed.settings, samples) or _STEP
     return MotionRun(decimal(largest * samples / step), decimal(step, 15), STEPS, conversion)
-
-
-def stated_step(settings: Settings) -> Fraction:
-    """Return the step in s that settings state, or the one of a run that states none."""
-    words = settings.stated.split()
-    return Fraction(words[words.index("--step") + 1]) if "--step" in words else _STEP
 
 
 def decimal(value: Fraction, digits: int = 2) -> str:
