@@ -27,7 +27,9 @@ def draw(path: Path, runs: int) -> None:
             found = [mean_nees("quadcopter", "industrial", way, runs, **{what: part}) for part in parts]
             panel.loglog(unit * np.array(parts), found, color=colour, marker=mark, label=way)
         panel.set_xlabel(label)
-        panel.set_xticks(unit * np.array(parts), [f"{unit * part:.2g}" for part in parts], minor=False)
+        panel.set_xticks(
+            unit * np.array(parts), [f"{float(f'{unit * part:.2g}'):g}" for part in parts], minor=False
+        )
         panel.set_xticks([], minor=True)
         figures.style(panel)
     axes[0].set_yticks([15, 50, 150, 500], ["15", "50", "150", "500"])

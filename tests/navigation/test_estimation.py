@@ -139,7 +139,6 @@ def test_derivatives_of_the_factor_are_those_of_its_errors(gtsam):
         ("racer", "GTSAM", {}, False),
         ("racer", "pair-1-8", {}, True),
         ("car", "pair-1-8", {}, True),
-        ("car", "GTSAM", {}, True),
         ("quadcopter", "kept-sample", {"vibration": 4.0}, False),
         ("quadcopter", "pair-1-8", {"vibration": 4.0}, True),
     ],
