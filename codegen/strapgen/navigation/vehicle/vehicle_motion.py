@@ -187,7 +187,7 @@ class VehicleMotion(Motion):
     def position(self, time: Any) -> Array:
         """Return the position C_n^e at some times, (..., 3, 3)."""
         times = np.asarray(time, float)
-        if self.controls.speed == 0 and not self.controls.accelerations:
+        if self.controls.stands:
             return np.asarray(np.broadcast_to(self._begin, (*times.shape, 3, 3)))
         flat = times.ravel()
         result = np.empty((len(flat), 9))
@@ -202,7 +202,7 @@ class VehicleMotion(Motion):
         self._extend(sign, float(ages.max()))
         pieces = self._pieces[sign]
         ends = np.array(pieces.ends)
-        place = np.searchsorted(ends, ages, side="right")
+        place = np.minimum(np.searchsorted(ends, ages, side="right"), len(ends) - 1)
         starts = np.concatenate([[0.0], ends[:-1]])[place]
         off = ((ages - starts) / (ends[place] - starts))[:, None] - _PLACES
         exact = np.abs(off) < 1e-14
@@ -233,11 +233,12 @@ class VehicleMotion(Motion):
     def _extend(self, sign: float, last: float) -> None:
         """Integrate the position up to an age: P' = P [rho x], by collocation at the nodes of each piece."""
         pieces, edges = self._pieces[sign], self.controls.edges if sign > 0 else []
-        while not pieces.ends or pieces.ends[-1] <= last:
+        stop = self.controls.end
+        while not pieces.ends or (pieces.ends[-1] <= last and pieces.ends[-1] < stop):
             begin = pieces.ends[-1] if pieces.ends else 0.0
             state = pieces.nodes[-1][-1].reshape(3, 3) if pieces.ends else self._begin
             following = bisect_right(edges, begin + 1e-9)
-            end = begin + _PIECE
+            end = min(begin + _PIECE, stop)
             if following < len(edges):
                 end = min(end, edges[following])
             times = sign * (begin + (end - begin) * _PLACES)
