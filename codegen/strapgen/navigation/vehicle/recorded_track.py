@@ -87,7 +87,11 @@ def read_track(path: Path) -> VehicleMotion:
         raise InputError(f"motion {path} cannot be read ({error.strerror})") from None
     except UnicodeDecodeError:
         raise InputError(f"motion {path} is not UTF-8") from None
-    return _motion(str(path), text)
+    try:
+        return _motion(str(path), text)
+    except InputError as error:
+        error.in_file = True  # its names are columns, not options
+        raise
 
 
 @lru_cache(maxsize=4)
