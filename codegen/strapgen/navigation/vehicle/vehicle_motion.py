@@ -162,6 +162,20 @@ class VehicleMotion(Motion):
         acceleration = evaluator("coriolis-gravity")(velocity, gravity, earth, transport)
         return earth + transport, np.asarray(acceleration)
 
+    def frame_rates(self, time: Any) -> tuple[Array, Array]:
+        """Return the earth rate and the transport rate in axes n at some times, rad/s, (..., 3) each."""
+        times = np.asarray(time, float)
+        position = self.position(times)
+        velocity = self.controls.velocity(times)[0]
+        return self._call("earth-rate", position), self._transport(position, velocity, self.height(times))
+
+    def mean_radius(self, time: Any) -> Array:
+        """Return the radius of the earth at some times, that of Gauss, and the height, in m."""
+        square = self.earth.constants["eccentricity_squared"]
+        sine = self.position(time)[..., 2, 2]
+        radius = self.earth.radius * math.sqrt(1 - square) / (1 - square * sine**2)
+        return np.asarray(radius + self.height(time))
+
     def _transport(self, position: Array, velocity: Array, height: Array) -> Array:
         return self._call("wander-rate-ellipsoid", position, velocity, height)
 
@@ -269,6 +283,17 @@ class VehicleMotion(Motion):
         Gauss's rule integrates each cycle in parts that end at the edges of the controls, with enough nodes for the
         highest frequency of a vibration.
         """
+        asked = interval, first, stop
+        if asked not in self._sampled:
+            self._sampled.clear()  # runs on other sensors ask for the same samples again
+            self._sampled[asked] = self._both_samples(*asked)
+        return self._sampled[asked]
+
+    @cached_property
+    def _sampled(self) -> dict[tuple[Fraction, int, int], tuple[Array, Array]]:
+        return {}
+
+    def _both_samples(self, interval: Fraction, first: int, stop: int) -> tuple[Array, Array]:
         step = float(interval)
         if self.period and first == 0:
             once = round(self.period / step)
