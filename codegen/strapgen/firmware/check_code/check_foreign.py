@@ -42,6 +42,7 @@ from strapgen.firmware.check_code.probes import (
     sizes_in_words,
 )
 from strapgen.firmware.check_code.rotation import rotation, rotation_segments
+from strapgen.firmware.check_code.upsets import upsets
 from strapgen.lab.motions.motions import motion
 from strapgen.results.records import INTERNAL, Properties, entry, properties
 from strapgen.results.result import Result
@@ -146,10 +147,12 @@ class _Check:
         self.closed: float | None = None
         self.coefficients: tuple[MeasuredCoefficient, ...] = ()
         self.ratio: float | None = None
+        #: That of the function, once it is known
+        self.convention: Convention | None = None
 
     def outcome(self) -> ForeignResult:
         """Run all checks."""
-        findings = tuple(self.findings())
+        findings = (*self.findings(), *self.upsets())
         failed = any(finding.holds is False for finding in findings)
         cause = "; ".join(dict.fromkeys(self.causes)) if failed and self.causes else None
         return ForeignResult(
@@ -193,6 +196,13 @@ class _Check:
             runs[name] = done.segments[place : place + len(part)]
             place += len(part)
         yield from self.measured(convention, runs)
+
+    def upsets(self) -> Iterator[Finding]:
+        """Yield the findings on input that fails and on long runs, once the function is known to work otherwise."""
+        if self.convention is not None:
+            for finding, cause in upsets(self.step, self.convention):
+                self.causes.extend([cause] if cause else [])
+                yield finding
 
     def failed(self, name: str, text: str, measured: float | None = None) -> Finding:
         """Return a finding whose text is its own cause."""
@@ -253,6 +263,7 @@ class _Check:
 
     def measured(self, convention: Convention, runs: dict[str, tuple[SegmentRun, ...]]) -> Iterator[Finding]:
         """Yield the findings on all segments."""
+        self.convention = convention
         still = rest(self.step, runs["at rest"])
         yield self.at_rest(still)
         runs = {name: tuple(run.in_resting_frame(still.frame) for run in part) for name, part in runs.items()}
