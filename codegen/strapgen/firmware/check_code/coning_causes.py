@@ -188,7 +188,7 @@ def confidence(products: Products, said: str) -> tuple[float, str] | None:
     left: dict[str, float] = {}
     ideals = [(RIGHT, base, ideal) for ideal, base in _ideals(products.samples)]
     for words, base, table in [*_faults(products), *ideals]:
-        rest = _size(_less(products.at_once, _plus(base, table)))
+        rest = _size(_plus(products.at_once, {pair: -c for pair, c in _plus(base, table).items()}))
         left[words] = min(left.get(words, math.inf), rest)
     if said == _by_size(products):
         left[said] = min(_scaled_rest(products, base, ideal) for _, base, ideal in ideals)

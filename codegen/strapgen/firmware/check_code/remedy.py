@@ -19,11 +19,6 @@ class Remedy:
     #: Its lines from the samples to the rotation vector, in C
     code: str
 
-    def text(self) -> str:
-        """Return the command and the lines, each of them indented."""
-        lines = "\n".join(f"    {line}" for line in self.code.splitlines())
-        return f"generated code that corrects it, of {self.command}:\n{lines}"
-
 
 def remedy(wanted: Design) -> Remedy:
     """Return the lines of the generated step with a published correction that compute its rotation vector.
@@ -32,14 +27,14 @@ def remedy(wanted: Design) -> Remedy:
     >>> print(remedy(design(2)).code.splitlines()[0])
     /* integral of the rate over the step */
     """
-    choice = published_step(f"coning-{wanted.form}", wanted)
+    # The combined step corrects more than coning.
+    form = "compressed" if wanted.form == "combined" else wanted.form
+    choice = published_step(f"coning-{form}", wanted)
     (text,) = (text for name, text in pipeline.compile(choice, "c").step_files.items() if name.endswith(".c"))
     body = text[text.index("next[4])\n{") :]
     first = [*re.finditer(r"= increments\[\d+\];\n", body)][-1].end()
     last = body.index(";\n", body.index(" phi_z =")) + 1
     lines = [line.removeprefix("    ") for line in body[first:last].splitlines()]
     before = f" --previous {wanted.previous}" if wanted.previous else ""
-    command = (
-        f"strapgen generate euler --method coning-{wanted.form} --increments {wanted.increments}{before}"
-    )
+    command = f"strapgen generate euler --method coning-{form} --increments {wanted.increments}{before}"
     return Remedy(command, "\n".join(lines))

@@ -37,12 +37,12 @@ _STILL = 64
 _ALIKE = 0.02
 
 
-def upsets(step: ForeignStep, convention: Convention) -> Iterator[tuple[Finding, str]]:
-    """Yield the findings of a function whose input fails, each with the cause of a failure or ""."""
+def upsets(step: ForeignStep, convention: Convention, *, long: bool) -> Iterator[tuple[Finding, str]]:
+    """Yield the findings of a function whose input fails, and of a long run, each with the cause of a failure or ""."""
     if step.source.arguments.elements and step.source.arguments.named(INTERVAL, STEP):
         yield from _intervals(step, convention)
     yield _not_a_number(step, convention)
-    if step.source.arguments.elements > 3:
+    if long and step.source.arguments.elements > 3:
         yield _long_run(step, convention)
 
 
@@ -138,7 +138,7 @@ def _not_a_number(step: ForeignStep, convention: Convention) -> tuple[Finding, s
         last = int(np.flatnonzero(~finite)[-1]) + 1
         text = f"after a NaN in one sample the attitude is not finite in {last} call{'s' if last > 1 else ''}, then is"
     else:
-        text = f"a NaN in one sample stays in the attitude for ever ({_RECOVERY} calls were seen)"
+        text = f"a NaN in one sample stays in the attitude ({_RECOVERY} calls were seen)"
     return Finding("NaN", None, text), ""
 
 
