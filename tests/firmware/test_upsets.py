@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import pytest
 
 from strapgen.firmware.check_code.check_foreign import check_foreign
 from strapgen.firmware.check_code.foreign import ForeignStep
-from strapgen.firmware.check_code.foreign_arguments import ForeignSource, read_arguments
 from strapgen.firmware.check_code.interpreted import interpreted_source
 
 #: A filter that holds its attitude, scalar part last; what it makes of its input and of the state is left open.
@@ -54,19 +51,15 @@ PARTS = {
 
 
 @pytest.fixture
-def said(tmp_path: Path):
+def said(outcome):
     """Return the findings on a filter by name, and the cause."""
 
     def check(**parts: str):
         text = FILTER
         for name, instead in {**PARTS, **parts}.items():
             text = text.replace(name, instead)
-        (tmp_path / "filter.c").write_text(text)
-        precision = parts.get("NUMBER", "double")
-        arguments = read_arguments("rates[3], dt -> global q[4]")
-        source = ForeignSource(tmp_path / "filter.c", "step", arguments, "begin", precision)
-        outcome = check_foreign(ForeignStep(source, takes="rates"))
-        return {finding.name: finding for finding in outcome.findings}, outcome.cause
+        checked = outcome(text, "rates[3], dt -> global q[4]", init="begin")
+        return {finding.name: finding for finding in checked.findings}, checked.cause
 
     return check
 

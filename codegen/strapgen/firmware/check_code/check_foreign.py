@@ -197,7 +197,7 @@ class _Check:
             self.sure[1] if self.sure else None,
             self.remedy.code if self.remedy else None,
             self.remedy.command if self.remedy else None,
-            self.step.source.reading,
+            self.step.reading,
         )
 
     def findings(self) -> Iterator[Finding]:
@@ -372,7 +372,7 @@ class _Check:
             yield shown
             proved = proved if shown.holds else min(proved, 2)
         seen = ladder.ladder(self.step, runs["order"], standard)
-        if self.step.source.precision == "float":
+        if self.step.source.precision != "double":
             order, self.order = ladder.order_in_float(self.step, seen, standard, proved)
         else:
             order, self.order = ladder.order_on_ladder(self.step, seen)

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
+from strapgen.firmware.check_code.bridge import ForeignSource
 from strapgen.firmware.check_code.conformance import Finding
 from strapgen.firmware.check_code.foreign import (
     RATE_INPUTS,
@@ -17,7 +18,7 @@ from strapgen.firmware.check_code.foreign import (
     lengths,
     rotation_vectors,
 )
-from strapgen.firmware.check_code.foreign_arguments import INTERVAL, STEP, ForeignSource
+from strapgen.firmware.check_code.foreign_arguments import INTERVAL, STEP, is_whole
 from strapgen.firmware.check_code.ladder import drift_segments
 
 Array = NDArray[np.float64]
@@ -33,6 +34,8 @@ _PERIOD, _READ = 10, 50
 _NORM_WITHIN, _UNITS = 1e-4, 4
 #: Largest change without rotation that is rounding, in units in the last place.
 _STILL = 64
+#: Calls of a fast rotation, parts of the fastest rate, and the largest part of a rotation that rounding takes.
+_FAST_CALLS, _PARTS, _FAST_WITHIN = 40, (1.0, 0.5, 0.25, 0.125, 0.0625), 0.05
 #: Largest part of a rotation by which two are taken as the same.
 _ALIKE = 0.02
 
@@ -41,9 +44,36 @@ def upsets(step: ForeignStep, convention: Convention, *, long: bool) -> Iterator
     """Yield the findings of a function whose input fails, and of a long run, each with the cause of a failure or ""."""
     if step.source.arguments.elements and step.source.arguments.named(INTERVAL, STEP):
         yield from _intervals(step, convention)
-    yield _not_a_number(step, convention)
+    if is_whole(step.source.arguments.samples):
+        yield _fast(step, convention)
+    else:
+        yield _not_a_number(step, convention)
     if long and step.source.arguments.elements > 3:
         yield _long_run(step, convention)
+
+
+def _fast(step: ForeignStep, convention: Convention) -> tuple[Finding, str]:
+    """Return whether integers hold the fastest rotation that a gyro measures, about each axis in both directions."""
+    rates = [step.most / float(step.interval) * part for part in _PARTS]
+    fed = [rate * sign * axis for rate in rates for axis in np.eye(3) for sign in (1, -1)]
+    calls = np.ones((_FAST_CALLS, step.samples, 3)) * float(step.interval)
+    done, parts = step.outputs([Segment(calls * rate) for rate in fed], convention)
+    if done.stopped:
+        text = f"at {rates[0]:.3g} rad/s {done.stopped}"
+        return Finding("fast", False, text), text
+    off = []
+    for rate, part in zip(fed, parts, strict=True):
+        matrices = convention.matrices(part[step.settling :, : step.source.arguments.elements])
+        turns = rotation_vectors(np.swapaxes(matrices[:-1], -1, -2) @ matrices[1:])
+        angle = rate * float(step.interval) * step.samples
+        off.append(float(np.linalg.norm(turns - angle, axis=1).max() / np.linalg.norm(angle)))
+    worst = [max(off[k : k + 6]) for k in range(0, len(off), 6)]
+    held = next((rate for rate, each in zip(rates, worst, strict=True) if each <= _FAST_WITHIN), 0.0)
+    at = f"at {rates[0]:.3g} rad/s ({np.degrees(rates[0]):.4g} deg/s) its integers"
+    if worst[0] <= _FAST_WITHIN:
+        return Finding("fast", True, f"{at} hold the rotation", worst[0], _FAST_WITHIN), ""
+    text = f"{at} overflow: a call turns wrong by {worst[0]:.3g} of it; it holds up to {held:.3g} rad/s"
+    return Finding("fast", False, text, worst[0], _FAST_WITHIN), text
 
 
 def _steady(step: ForeignStep, calls: int) -> Array:
