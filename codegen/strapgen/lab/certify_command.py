@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Annotated
 
 from strapgen.cli.fixed_options import RUN_OPTIONS, FixedOptions
 from strapgen.cli.option_groups import Needs, OneOf, Shown, grouped, rules
-from strapgen.cli.options import STEP_OPTIONS, MethodOptions, StepAlgorithm, option
+from strapgen.cli.options import STEP_OPTIONS, MethodOptions, RunAlgorithm, option
 from strapgen.cli.output import Output
 from strapgen.cli.values import Positive, names, whole
 from strapgen.ir.exceptions import InputError
-from strapgen.lab.run_options import RecordingOptions, RunOptions
+from strapgen.lab.run_options import RecordingOptions, RunOptions, described
 
 if TYPE_CHECKING:
     from strapgen.catalogue import Choice
@@ -32,7 +32,7 @@ _STEP_OFF = 0.01
     Needs("--amplitude-deg-s", "--band-hz"),
 )
 def certify(
-    algorithm: StepAlgorithm,
+    algorithm: RunAlgorithm,
     *,
     method: Annotated[MethodOptions, Shown(only=STEP_OPTIONS)],
     target: Annotated[
@@ -101,8 +101,23 @@ def certify(
 
     With --band-hz and --amplitude-deg-s you also see how far the attitude can be from the true one.
 
+    Of a described system, such as two-speed-euler or a file, you see the rounding of each output, as of attitude,
+    velocity and position, and which stage did most of it.
+
     Example: strapgen certify euler --recording examples/gyro_log.csv --gaps bridge
     """
+    if (other := described(algorithm)) is not None:
+        options = {
+            "--states": states,
+            "--orthonormalize": intervals.orthonormalize,
+            "--scheme": intervals.scheme,
+            "--band-hz": band,
+            "--results": results,
+            "--jobs": None if jobs == 1 else jobs,
+        }
+        given = [name for name, value in options.items() if value is not None]
+        backend = _backend_of(target, fixed.word or 32, False)
+        return other.certify(algorithm, given, method, backend, source, intervals, fixed, output)
     choice = method.choose(algorithm)
     output.check(algorithm, *method.files, source.file, states)
     if choice.increments is None:

@@ -60,6 +60,7 @@ REGISTRATION = Registration(
         "two-speed": f"{__package__}.two_speed.two_speed_command:TwoSpeedResult",
         "system": f"{__package__}.systems.system_report:SystemResult",
         "system-outputs": f"{__package__}.systems.system_runs:SystemCourseResult",
+        "system-certificate": f"{__package__}.systems.system_certificate:SystemCertificateResult",
         "system-comparison": f"{__package__}.systems.system_comparison:SystemComparisonResult",
         "system-study": f"{__package__}.systems.system_study:SystemStudyResult",
         "course": f"{__package__}.courses:CourseResult",
