@@ -63,6 +63,8 @@ class Departure(Record):
     header_bound_rad: float | None = field(metadata=entry("header, rad", ANGLE))
     #: Angle between the step in exact arithmetic and the exact rotation of the rate that it fits
     truncation_rad: float | None = field(metadata=entry("truncation, rad", ANGLE))
+    #: Angle that rounding has made in the attitude of now of a unit that commits late
+    now_rounding_rad: float | None = field(default=None, metadata=entry("now, rad", ANGLE))
 
 
 @dataclass(frozen=True)
@@ -117,6 +119,12 @@ class CertificateResult(Result):
     #: Intervals in which the state departs by more than rounding makes
     faults: Sequence[Fault]
     departures: Sequence[Departure]
+    #: Of a unit that commits late: the angle after the intervals of its start, and that in the attitude of now before
+    #: the last intervals are committed, with the radius of its ball, and the largest at any of the instants
+    start_rounding_rad: float | None = None
+    now_rounding_rad: float | None = None
+    now_rounding_radius_rad: float | None = None
+    largest_now_rounding_rad: float | None = None
     #: Where the increments come from
     source: str = field(default="", metadata=INTERNAL)
 
@@ -129,6 +137,12 @@ class CertificateResult(Result):
             f"rounding on this run: {self.rounding_rad:.3g} rad +- {rounded_up(self.rounding_radius_rad)}{header}, "
             f"about {_axes(self.rounding_axes_rad)}",
         ]
+        if self.now_rounding_rad is not None:
+            lines.append(
+                f"at its start: {self.start_rounding_rad:.3g} rad; in the attitude of now at the end: "
+                f"{self.now_rounding_rad:.3g} rad +- {rounded_up(self.now_rounding_radius_rad or 0.0)}, at most "
+                f"{self.largest_now_rounding_rad:.3g} rad"
+            )
         truncation = "not examined"
         if self.truncation_rad is not None:
             truncation = f"{self.truncation_rad:.3g} rad +- {rounded_up(self.truncation_radius_rad or 0.0)}"
