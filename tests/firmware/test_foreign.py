@@ -12,7 +12,7 @@ import pytest
 
 from strapgen.cli import main
 from strapgen.firmware.check_code import foreign
-from strapgen.firmware.check_code.foreign import compile_foreign, run_foreign
+from strapgen.firmware.check_code.foreign import ForeignStep, Segment, compile_foreign, run_foreign
 from strapgen.firmware.check_code.foreign_arguments import ForeignSource, is_foreign, read_arguments
 from strapgen.ir.exceptions import CompilerError, InputError
 
@@ -57,6 +57,61 @@ def test_a_function_gets_every_argument_and_a_run_begins_where_it_says(file):
     )  # the second call takes the state of the first
     np.testing.assert_array_equal(run.outputs[:, 1:], np.tile([57, 0.5, 1], (3, 1)))
     assert compile_foreign(ForeignSource(file, "look", arguments, "begin")) == module  # from the cache
+
+
+#: A function that looks at what it gets beside the samples of a gyro.
+BESIDE = """
+typedef struct { double q[4]; double v[3]; } nav_t;
+void put(nav_t *nav, const double d[3], const double f[3], const double g[3], const double w[3], double dt)
+{
+    for (int i = 0; i < 3; i++) { nav->q[i] = d[i]; nav->v[i] += f[i] * dt + g[i]; }
+    nav->q[3] = w[0];
+}
+void look(double q[4], const double d[2][3], const double s[2][3], double v[3], const double p[3], double p_next[3])
+{
+    for (int i = 0; i < 3; i++) { v[i] += s[1][i]; p_next[i] = p[i] + 10 * v[i]; }
+    q[0] = d[0][0];
+}
+void change(const double d[3], const double s[3], double change[3])
+{
+    for (int i = 0; i < 2; i++) change[i] = d[i] + s[i];
+}
+"""
+PUT = "nav_t *nav, increments[3], forces[3], gravity[3], frame_rate[3], dt -> nav.q[4], velocity = nav.v[3]"
+CHANGE = "increments[3], velocity_increments[3] -> velocity_change[3]"
+LOOK = (
+    "state[4], increments[2][3], velocity_increments[2][3], velocity[3], position[3] "
+    "-> state[4], velocity[3], next_position[3]"
+)
+
+
+def test_a_function_gets_specific_force_gravity_and_the_rate_of_the_frame(tmp_path):
+    (tmp_path / "a.c").write_text(BESIDE)
+    rates, pushes = np.full((2, 1, 3), 0.01), np.array([[[1.0, 2, 3]], [[4, 5, 6]]])
+
+    def run(function: str, arguments: str, segment: Segment, **more):
+        source = ForeignSource(tmp_path / "a.c", function, read_arguments(arguments))
+        (done,) = ForeignStep(source, **more).run([segment]).segments
+        return done
+
+    done = run(
+        "put",
+        PUT,
+        Segment(rates, settled=False, velocities=pushes),
+        gravity=(0, 0, -9.0),
+        frame_rate=(0.5, 0, 0),
+    )
+    np.testing.assert_array_equal(done.states, [[0.01, 0.01, 0.01, 0.5]] * 2)
+    expected = [[0, 0, 0], [1, 2, -6], [5, 7, -9]]
+    np.testing.assert_allclose(done.translations["velocity"], expected, atol=1e-13)
+    rates, pushes = np.tile(rates, (1, 2, 1)), np.tile(pushes, (1, 2, 1))
+    done = run("look", LOOK, Segment(rates, velocities=pushes))
+    expected = [[0, 0, 0], [1, 2, 3], [5, 7, 9]]
+    np.testing.assert_array_equal(done.translations["velocity"], expected)
+    np.testing.assert_array_equal(done.translations["position"], 10 * np.cumsum(expected, axis=0))
+    source = ForeignSource(tmp_path / "a.c", "change", read_arguments(CHANGE))
+    done = ForeignStep(source).run([Segment(rates[:, :1])])  # the third number is never written
+    assert done.stopped.startswith("it leaves no finite numbers")
 
 
 def test_faults_of_a_function_are_named(file, monkeypatch):
@@ -250,7 +305,24 @@ def test_arguments_are_read_in_the_order_of_c(text, names, count, elements):
         ("state[9], increments[3] -> state[3][3]", "they must agree"),
         ("increments[3] -> filter.q[4]", "the result 'filter.q.4.' is not known; allowed: next"),
         ("increments[3] -> next[3]", r"has another shape; allowed: \[4\], \[9\], \[3\]\[3\], or"),
-        ("increments[3] -> next[4], dt", "cannot be read"),
+        ("increments[3] -> next[4], dt", "the result .dt. is not known"),
+        ("state[4], increments[3], velocity_increments[3] -> state[4]", "need each other"),
+        ("state[4], increments[3], velocity[3] -> state[4], velocity[3]", "need each other"),
+        (
+            "increments[2][3], forces[3] -> velocity_change[3]",
+            "forces has 3 numbers, increments 6; they must",
+        ),
+        ("increments[3], forces[3] -> next_velocity[3]", "is in reference axes, and needs an attitude there"),
+        ("increments[3], forces[3] -> next[4], next_position[3]", "position needs a velocity behind"),
+        ("increments[3], forces[3], gravity[3] -> velocity_change[3]", "gravity needs a velocity behind"),
+        ("increments[3], forces[3] -> next[4], velocity[3]", "velocity stands behind the arrow alone"),
+        ("increments[3], forces[3] -> next[4], velocity_change[4]", "another shape; .3. is needed"),
+        (
+            "increments[3], forces[3] -> next[4], speed = velocity[3]",
+            "names no result; allowed: velocity, pos",
+        ),
+        ("increments[3], frame_rate[3] -> rotation[3]", "frame_rate needs an attitude behind the arrow"),
+        ("increments[3] -> next[4], rotation[3]", "stands twice behind the arrow"),
     ],
 )
 def test_uncallable_functions_get_one_line(text, says):
@@ -364,7 +436,7 @@ def test_the_page_of_the_examples_names_every_fault_as_the_command_does(check):
         (f"euler {COMMAND}", "--function goes with a file in C"),
         (
             f"{PLACE}/correct.c {COMMAND} --method rk4",
-            "--method goes with an algorithm of strapgen; .* is a file in C",
+            "--method goes with an algorithm of strapgen; .* is code of your own",
         ),
         (
             f"{PLACE}/correct.c {COMMAND} --sense body",

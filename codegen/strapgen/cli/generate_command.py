@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, ClassVar
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 import typer
 
 from strapgen import registration
-from strapgen.cli import terminal
+from strapgen.cli import project_kinds, terminal
 from strapgen.cli.fixed_options import FixedOptions
 from strapgen.cli.option_groups import Excludes, OneOf, grouped, rules, stated
 from strapgen.cli.options import MethodOptions, OptionalAlgorithm, option
@@ -77,7 +77,7 @@ class SourceOptions:
         ),
     ] = None
     with_runs: WithRuns = False
-    project: Project = False
+    project: Project = None
     check: Annotated[
         bool,
         option(
@@ -109,6 +109,26 @@ class SourceOptions:
                     )
         if self.project and not TARGETS[target].compiled:
             raise InputError(f"--project goes with targets in C, not with {target}")
+
+    def files(self, sources: Sources, point: str, *task: Any) -> dict[str, str]:
+        """Return the files to write: those of sources, in a project if one is asked for.
+
+        `task` are the arguments of the function of the extension point that writes projects.
+        """
+        files = dict(sources.files if self.with_runs else sources.step_files)
+        if self.project is None:
+            return files
+        if self.project != project_kinds.DEFAULT:
+            if self.with_runs:
+                raise InputError(f"--with-runs does not go with --project {self.project}")
+            files = {}
+        project_kinds.require_target(self.project, sources.target)
+        writer = registration.extension(point, "--project")
+        project: dict[str, str] = writer.project_files(*task, kind=self.project)
+        if not self.check:
+            new = {name: text for name, text in project.items() if name not in files}
+            writer.refuse_changed(self.out or Path(), new, self.force)
+        return files | project
 
     @property
     def is_printed(self) -> bool:
@@ -223,12 +243,7 @@ def generate(
     results = [(task, pipeline.compile(*task)) for task in tasks]
     for _, sources in results:
         fixed.check_feedback(sources)
-    groups = [sources.files if output.with_runs else sources.step_files for _, sources in results]
-    if output.project:
-        groups = [
-            {**files, **_project_files(task, output)}
-            for (task, _), files in zip(results, groups, strict=True)
-        ]
+    groups = [output.files(sources, "generate.project", *task) for task, sources in results]
     files = output.chosen(_together(groups))
     groups = [{name: text for name, text in group.items() if name in files} for group in groups]
     if output.is_printed:
@@ -273,15 +288,6 @@ def request(
     output.require_language(target)
     fixed.check_increments(choice)
     return Request(choice, target, settings, output.naming)
-
-
-def _project_files(task: Request, output: SourceOptions) -> dict[str, str]:
-    """Return the files that build and test the C, unless a file of the user is in their place."""
-    writer = registration.extension("generate.project", "--project")
-    files: dict[str, str] = writer.project_files(*task)
-    if not output.check:
-        writer.refuse_changed(output.out or Path(), files, output.force)
-    return files
 
 
 def _text(sources: Sources, written: list[Path], settings: Settings | None, samples: int) -> str:

@@ -13,26 +13,42 @@ import re
 import signal
 import subprocess
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
+from functools import partial
 from itertools import accumulate, dropwhile
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from strapgen.firmware.check_code.foreign_arguments import RATES, ForeignSource, bridge_text, definitions
+from strapgen.firmware.check_code.foreign_arguments import (
+    FORCES,
+    FRAME_RATE,
+    GRAVITY,
+    PUSHES,
+    RATES,
+    VELOCITY,
+    ForeignSource,
+    bridge_text,
+    definitions,
+)
 from strapgen.ir import checks
 from strapgen.ir.checks import suggestions
 from strapgen.ir.exceptions import CompilerError, InputError
 from strapgen.ir.timing import timed
+from strapgen.ir.units import STANDARD_GRAVITY
+from strapgen.lab.recordings.rest import EARTH_RATE_RAD_S
 from strapgen.lab.runs import drift_between
 from strapgen.run import compiler
 from strapgen.run.backends import evaluator
 from strapgen.run.increments import windows
 from strapgen.storage import cache, drafts
+
+if TYPE_CHECKING:
+    from strapgen.firmware.check_code.interpreted import InterpretedSource
 
 Array = NDArray[np.float64]
 SCALARS = ("last", "first")
@@ -45,6 +61,11 @@ INPUTS = ("increments", *RATE_INPUTS)
 INTERVAL = Fraction(1, 100)
 #: Samples that a function may remember; calls without rotation push so many out of its memory.
 REMEMBERED = 8
+#: What a function is handed unless something else is stated: gravity in m/s^2 with z up, and the rate of north, east
+#: and down in rad/s at 45 degrees of latitude.
+STANDARD_GRAVITY_DOWN = (0.0, 0.0, -STANDARD_GRAVITY)
+EARTH_RATE_AT_45_DEG = (EARTH_RATE_RAD_S * math.sqrt(0.5), 0.0, -EARTH_RATE_RAD_S * math.sqrt(0.5))
+_NOTHING = (0.0, 0.0, 0.0)
 #: Longest time in s that a run may take.
 PATIENCE = 20
 #: Largest rate in rad/s that is fed while the interval is short: a gyro measures it (2000 deg/s are 34.9 rad/s).
@@ -77,7 +98,7 @@ class Convention:
     def identity(self, elements: int) -> Array:
         """Return the elements of no rotation."""
         if elements != 4:
-            return np.eye(3).ravel() if elements == 9 else np.zeros(3)
+            return np.eye(3).ravel() if elements == 9 else np.zeros(elements)
         identity: Array = np.eye(4)[3 if self.scalar == "last" else 0]
         return identity
 
@@ -85,8 +106,10 @@ class Convention:
         """Return direction cosine matrices, body to reference, of states (N, elements).
 
         A state of another length than 1 is read as the rotation nearest to it. Rotation vectors, which have three
-        elements, turn the attitude one after the other.
+        elements, turn the attitude one after the other. Without elements there is no rotation.
         """
+        if states.shape[-1] == 0:
+            return np.broadcast_to(np.eye(3), (len(states), 3, 3))
         if states.shape[-1] == 9:
             matrices = _nearest(states.reshape(-1, 3, 3))
         elif states.shape[-1] == 3:
@@ -109,6 +132,8 @@ class Segment:
     increments: Array
     #: Whether calls without rotation come first, which empty a memory of samples
     settled: bool = True
+    #: (N, K, 3): velocity increments of the same samples in m/s; None for none
+    velocities: Array | None = None
 
 
 @dataclass(frozen=True)
@@ -121,6 +146,8 @@ class SegmentRun:
     matrices: Array
     #: (1 + N, 3, 3): the attitudes relative to the one before the first call
     relative: Array
+    #: By their meanings the results beside the attitude, (1 + N, 3) each: before the first call, and after every call
+    translations: Mapping[str, Array] = field(default_factory=dict)
 
     @property
     def start(self) -> Array:
@@ -159,14 +186,19 @@ class ForeignRun:
 class ForeignStep:
     """A user's function that is compiled, and how it is fed."""
 
-    source: ForeignSource
+    source: ForeignSource | InterpretedSource
     convention: Convention = Convention()
     #: "increments" in rad, or "rates" in rad/s, which are the means over the time between samples, or "rates-
     #: at-ends", which are those at the end of each
     takes: str = "increments"
     #: Time between samples in s
     interval: Fraction = INTERVAL
-    module: Path = field(init=False)
+    #: Gravity in m/s^2 and rate of the reference axes in rad/s, reference axes: what the function has in it, or is
+    #: handed; None where nothing is stated
+    gravity: tuple[float, ...] | None = None
+    frame_rate: tuple[float, ...] | None = None
+    #: Calls the function once for each row, see `run_calls`
+    calls: Callable[[Any, Any], ForeignRun] = field(init=False, compare=False, repr=False)
 
     def __post_init__(self) -> None:
         checks.choice("input", self.takes, INPUTS)
@@ -174,7 +206,16 @@ class ForeignStep:
             raise InputError(
                 f"--input {self.takes} contradicts the argument rates; --input {RATES} or {ENDS} fits it"
             )
-        object.__setattr__(self, "module", compile_foreign(self.source))
+        arguments, source = self.source.arguments, self.source
+        if self.gravity is not None and VELOCITY not in arguments.meanings:
+            raise InputError("--gravity-m-s2 goes with a velocity behind the arrow of --arguments")
+        if self.frame_rate is not None and arguments.elements <= 3:
+            raise InputError("--frame-rate-rad-s goes with an attitude behind the arrow of --arguments")
+        if isinstance(source, ForeignSource):
+            calls: Callable[[Any, Any], ForeignRun] = partial(run_foreign, compile_foreign(source))
+        else:
+            calls = source.run
+        object.__setattr__(self, "calls", calls)
 
     @property
     def samples(self) -> int:
@@ -191,6 +232,18 @@ class ForeignStep:
         """The largest angle of a sample in rad that a gyro measures."""
         return float(_MOST_RATE * self.interval)
 
+    @property
+    def acceleration(self) -> Array:
+        """Gravity in m/s^2 that the function is to add, (3,), reference axes."""
+        handed = STANDARD_GRAVITY_DOWN if self.source.arguments.named(GRAVITY) else _NOTHING
+        return np.array(handed if self.gravity is None else self.gravity, float)
+
+    @property
+    def frame(self) -> Array:
+        """Rate in rad/s of the reference axes that the function is to follow, (3,), in these axes."""
+        handed = EARTH_RATE_AT_45_DEG if self.source.arguments.named(FRAME_RATE) else _NOTHING
+        return np.array(handed if self.frame_rate is None else self.frame_rate, float)
+
     def calls_for(self, angle: float, fewest: int) -> int:
         """Return the number of calls that a rotation by an angle in rad takes, at rates that a gyro measures."""
         return max(fewest, math.ceil(angle / (self.samples * self.most)))
@@ -205,8 +258,9 @@ class ForeignStep:
         read = convention or self.convention
         arguments = self.source.arguments
         rows = np.concatenate([self._rows(segment) for segment in segments])
-        identity = read.identity(arguments.elements)
-        done = run_foreign(self.module, identity, rows)
+        elements = arguments.elements
+        identity = np.concatenate([read.identity(elements), np.zeros(arguments.numbers - elements)])
+        done = self.calls(identity, rows)
         if not done.stopped and not np.abs(done.outputs).max() < _LARGEST:  # not finite: no number compares
             done = replace(
                 done, stopped="it leaves no finite numbers in its result, or does not write all of it"
@@ -220,8 +274,17 @@ class ForeignStep:
             outputs = done.outputs[place : place + first + count]
             before = outputs[first - 1] if first else identity
             place += first + count
-            matrices = read.matrices(np.vstack([before, outputs[first:]]))
-            runs.append(SegmentRun(outputs[first:], matrices[1:], matrices[0].T @ matrices))
+            whole = np.vstack([before, outputs[first:]])
+            states = whole[:, :elements]
+            matrices = read.matrices(states)
+            translations = dict(
+                zip(
+                    arguments.meanings, np.split(whole[:, elements:], len(arguments.meanings), 1), strict=True
+                )
+                if arguments.meanings
+                else ()
+            )
+            runs.append(SegmentRun(states[1:], matrices[1:], matrices[0].T @ matrices, translations))
         return replace(done, segments=tuple(runs))
 
     def _rows(self, segment: Segment) -> Array:
@@ -232,12 +295,30 @@ class ForeignStep:
         numbers = windows(np.concatenate([np.zeros((previous, 3)), samples]), count, previous)
         if self.takes != "increments":
             numbers = numbers / float(self.interval)
+        numbers = numbers.reshape(len(numbers), -1)
+        beside = self._beside(segment, len(quiet))
+        numbers = np.hstack(
+            [numbers, *(np.broadcast_to(each, (len(numbers), each.shape[-1])) for each in beside)]
+        )
         rows = np.empty((len(numbers), 3 + numbers[0].size))
         rows[:, 0] = np.arange(len(numbers)) == 0
         rows[:, 1] = float(self.interval)
         rows[:, 2] = float(self.interval * count)
-        rows[:, 3:] = numbers.reshape(len(numbers), -1)
+        rows[:, 3:] = numbers
         return rows
+
+    def _beside(self, segment: Segment, quiet: int) -> Iterator[Array]:
+        """Yield what calls get beside the samples of the gyro, a row for each of them or one for all."""
+        arguments = self.source.arguments
+        if pushes := arguments.named(*PUSHES):
+            size = 1.0 if pushes.name != FORCES else float(self.interval)
+            rows = np.zeros((quiet + len(segment.increments), pushes.size))
+            if segment.velocities is not None:
+                rows[quiet:] = segment.velocities.reshape(len(segment.velocities), -1) / size
+            yield rows
+        for name, vector in ((GRAVITY, self.acceleration), (FRAME_RATE, self.frame)):
+            if arguments.named(name):
+                yield vector
 
 
 def compile_foreign(source: ForeignSource) -> Path:
@@ -262,7 +343,26 @@ def compile_foreign(source: ForeignSource) -> Path:
 
 
 def run_foreign(module: Path, identity: Any, rows: Any) -> ForeignRun:
-    """Call a compiled function once for each row, in a process of its own.
+    """Call a compiled function once for each row, see `run_calls`."""
+    runner = str(Path(__file__).with_name("foreign_runner.py"))
+    with cache.loadable(module) as (path, descriptor):
+        handed = [] if path == str(module) else [descriptor]
+        return run_calls([sys.executable, "-P", runner, path], identity, rows, handed)
+
+
+def run_calls(
+    command: Sequence[str],
+    identity: Any,
+    rows: Any,
+    descriptors: Sequence[int] = (),
+    patience: float | None = None,
+    **files: str,
+) -> ForeignRun:
+    """Have a command, in a process of its own, call a function once for each row.
+
+    `command` gets two more words, a folder and the number of rows. The folder holds the doubles of `identity` and
+    `input`, and further `files`; the command writes `output`, and `flags` last. What it refuses it says in `refused`,
+    and why the function ended early in `stopped`.
 
     `identity` (elements,): the state that a run begins with. `rows` (N, 3 + numbers): for each call whether a
     run begins, the sampling interval in s, the duration of the call in s, and the numbers of its arguments, the
@@ -270,37 +370,38 @@ def run_foreign(module: Path, identity: Any, rows: Any) -> ForeignRun:
     """
     values = np.ascontiguousarray(rows, np.float64)
     start = np.ascontiguousarray(identity, np.float64)
-    nothing = np.empty((0, start.size))
+    nothing, seconds = np.empty((0, start.size)), PATIENCE if patience is None else patience
     with drafts.temporary_folder() as folder:
         (folder / "input").write_bytes(values.tobytes())
         (folder / "identity").write_bytes(start.tobytes())
-        command = [sys.executable, "-P", str(Path(__file__).with_name("foreign_runner.py"))]
+        for name, text in files.items():
+            (folder / name).write_text(text, encoding="utf-8", newline="\n")
         try:
-            with cache.loadable(module) as (path, descriptor):
-                done = subprocess.run(
-                    [*command, path, str(folder), str(len(values))],
-                    cwd=folder,
-                    pass_fds=[] if path == str(module) else [descriptor],
-                    stdin=subprocess.DEVNULL,
-                    stdout=subprocess.DEVNULL,
-                    stderr=subprocess.DEVNULL,
-                    timeout=PATIENCE,
-                    check=False,
-                )
-        except subprocess.TimeoutExpired:
-            return ForeignRun(nothing, f"{len(values)} calls have not come to an end in {PATIENCE} s")
-        unloaded = folder / "unloaded"
-        if unloaded.is_file():
-            reason = unloaded.read_text(encoding="utf-8").rpartition(path)[2].strip(": ")
-            raise CompilerError(
-                f"the function cannot be linked: {reason}; include the file that defines it in the one to check"
+            done = subprocess.run(
+                [*command, str(folder), str(len(values))],
+                cwd=folder,
+                pass_fds=descriptors,
+                stdin=subprocess.DEVNULL,
+                stdout=subprocess.DEVNULL,
+                stderr=subprocess.DEVNULL,
+                timeout=seconds,
+                check=False,
             )
-        flags = folder / "flags"
-        if done.returncode or not flags.is_file():
-            return ForeignRun(nothing, _reason(done.returncode))
-        bits = int(flags.read_text(encoding="utf-8"))
+        except subprocess.TimeoutExpired:
+            return ForeignRun(nothing, f"{len(values)} calls have not come to an end in {seconds} s")
+        said = {name: _line(folder / name) for name in ("refused", "stopped", "flags")}
+        if said["refused"]:
+            raise CompilerError(said["refused"])
+        if done.returncode or not said["flags"]:
+            return ForeignRun(nothing, said["stopped"] or _reason(done.returncode))
+        bits = int(said["flags"])
         outputs = np.frombuffer((folder / "output").read_bytes()).reshape(len(values), start.size)
     return ForeignRun(outputs, "", bool(bits & 1), bool(bits & 2))
+
+
+def _line(file: Path) -> str:
+    """Return the text of a file as one line; "" if there is none."""
+    return " ".join(file.read_text(encoding="utf-8", errors="replace").split()) if file.is_file() else ""
 
 
 def _reason(status: int) -> str:

@@ -4,12 +4,13 @@ The line has the arguments in their order in C, the attitude that the function c
 
     state[4], increments[2][3] -> next[4]
     filter_t *filter, rates[3], dt -> filter.q[4]
+    nav_t *nav, increments[3], velocity_increments[3], dt -> nav.q[4], velocity = nav.v[3]
 """
 
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import prod
 from pathlib import Path
 
@@ -28,12 +29,28 @@ SAMPLES = (INCREMENTS, RATES)
 ATTITUDES = ((4,), (9,), (3, 3))
 #: Result of a function that computes the rotation vector of its call and leaves the attitude to others.
 ROTATION = "rotation"
+#: The specific force: velocity increments in m/s, or the force in m/s^2, samples of the same intervals.
+VELOCITIES, FORCES = "velocity_increments", "forces"
+PUSHES = (VELOCITIES, FORCES)
+#: Gravity in m/s^2, and the rate of the reference axes against inertial space in rad/s, both in reference axes.
+GRAVITY, FRAME_RATE = "gravity", "frame_rate"
+#: Results beside the attitude: in reference axes, or the velocity change of the call in the body axes of its start.
+VELOCITY, POSITION, VELOCITY_CHANGE = "velocity", "position", "velocity_change"
+TRANSLATIONS = (VELOCITY, POSITION, VELOCITY_CHANGE)
 PRECISIONS = ("double", "float")
+#: Begin of the name of a result that has an array of its own, and all results that are arguments.
+_NEXT = "next_"
+_ARGUMENTS_OF_RESULTS = (STATE, NEXT, ROTATION, *TRANSLATIONS, _NEXT + VELOCITY, _NEXT + POSITION)
+#: Arguments that are filled before a call beside the samples of the gyro.
+_FED = (PUSHES, (GRAVITY,), (FRAME_RATE,))
 #: Most samples in a call, and most from before it.
 _MOST_SAMPLES, _MOST_PREVIOUS = 8, 3
 _ARRAY = re.compile(r"(?:(global)\s+)?([A-Za-z_][\w.]*)\s*((?:\[\s*\d+\s*\]\s*)*)")
 _MEMORY_PATTERN = re.compile(r"((?:[A-Za-z_][\w:]*\s+)*[A-Za-z_][\w:]*)\s*([*&])\s*([A-Za-z_]\w*)")
-_ALLOWED = "state[4] or state[3][3], increments[K][3] or rates[K][3], previous[P][3], dt, step, or memory as TYPE *name"
+_ALLOWED = (
+    "state[4] or state[3][3], increments[K][3] or rates[K][3], previous[P][3], velocity_increments[K][3] or "
+    "forces[K][3], velocity[3], position[3], gravity[3], frame_rate[3], dt, step, or memory as TYPE *name"
+)
 
 
 def is_foreign(path: str | Path) -> bool:
@@ -57,6 +74,8 @@ class ForeignArgument:
     type: str = ""
     #: "*" or "&" for memory that is passed as a pointer or as a reference
     reference: str = ""
+    #: Of a result beside the attitude, which of `TRANSLATIONS` it is
+    meaning: str = ""
 
     @property
     def size(self) -> int:
@@ -70,8 +89,11 @@ class ForeignArguments:
 
     #: In their order in C
     parameters: tuple[ForeignArgument, ...]
-    #: The attitude after a call: an argument, or what is read after the call, such as a field of memory
+    #: The attitude after a call: an argument, or what is read after the call, such as a field of memory; of size 0
+    #: if the function computes none
     result: ForeignArgument
+    #: The results beside it
+    translations: tuple[ForeignArgument, ...] = ()
 
     def named(self, *names: str) -> ForeignArgument | None:
         """Return the argument of one of some names; None if there is none."""
@@ -101,13 +123,33 @@ class ForeignArguments:
         return next((argument for argument in self.parameters if argument.type), None)
 
     @property
-    def in_place(self) -> bool:
-        """Whether the result takes the place of the state."""
-        return self.result.name == STATE
+    def fed(self) -> list[ForeignArgument]:
+        """The arguments that are filled before every call, in the order of their numbers."""
+        fed = (self.named(PREVIOUS), self.samples, *(self.named(*names) for names in _FED))
+        return [argument for argument in fed if argument]
+
+    @property
+    def results(self) -> list[ForeignArgument]:
+        """The places of all results, the attitude first."""
+        return [each for each in (self.result, *self.translations) if each.size]
+
+    @property
+    def numbers(self) -> int:
+        """Number of elements of all results together."""
+        return sum(result.size for result in self.results)
+
+    @property
+    def meanings(self) -> tuple[str, ...]:
+        """What the results beside the attitude are."""
+        return tuple(each.meaning for each in self.translations)
+
+    def before(self, result: ForeignArgument) -> ForeignArgument | None:
+        """Return the argument that holds a result before the call; None if the function keeps it."""
+        return None if result.meaning == VELOCITY_CHANGE else self.named(result.meaning or STATE)
 
     @property
     def elements(self) -> int:
-        """Number of elements of the result: 4 or 9 of an attitude, or 3 of the rotation vector of a call."""
+        """Number of elements of the attitude: 4 or 9, 3 of the rotation vector of a call, or 0 if there is none."""
         return self.result.size
 
 
@@ -117,8 +159,8 @@ def read_arguments(text: str) -> ForeignArguments:
     >>> arguments = read_arguments("state[4], increments[2][3] -> next[4]")
     >>> [argument.name for argument in arguments.parameters], arguments.count, arguments.elements
     (['state', 'increments', 'next'], 2, 4)
-    >>> read_arguments("state[9], rates[3], dt -> state[9]").in_place
-    True
+    >>> read_arguments("increments[3], velocity_increments[3] -> rotation[3], velocity_change[3]").meanings
+    ('velocity_change',)
     """
     if text.count("->") + text.count("<-") != 1:
         raise InputError(
@@ -127,13 +169,19 @@ def read_arguments(text: str) -> ForeignArguments:
         )
     backwards = "<-" in text
     first, second = (part.strip() for part in re.split(r"->|<-", text))
-    inputs, output = (second, first) if backwards else (first, second)
+    inputs, outputs = (second, first) if backwards else (first, second)
     parameters = [_argument(part.strip()) for part in inputs.split(",")]
-    result = _result(output, parameters)
+    results = [_result(part.strip(), parameters) for part in outputs.split(",")]
+    attitudes = [result for result in results if not result.meaning]
+    translations = tuple(result for result in results if result.meaning)
+    result = attitudes[0] if attitudes else ForeignArgument("", (0,))
     _refuse_what_does_not_fit(parameters, result)
-    if result.name in (NEXT, ROTATION):
-        parameters.insert(0 if backwards else len(parameters), result)
-    return ForeignArguments(tuple(parameters), result)
+    _refuse_other_results(parameters, attitudes, translations)
+    names = {argument.name for argument in parameters}
+    new = [each for each in results if each.name in _ARGUMENTS_OF_RESULTS and each.name not in names]
+    place = 0 if backwards else len(parameters)
+    parameters[place:place] = new
+    return ForeignArguments(tuple(parameters), result, translations)
 
 
 def _argument(text: str) -> ForeignArgument:
@@ -141,8 +189,9 @@ def _argument(text: str) -> ForeignArgument:
     if memory := _MEMORY_PATTERN.fullmatch(text):
         return ForeignArgument(memory[3], (), memory[1], memory[2])
     argument = _array(text)
-    shapes = {STATE: ATTITUDES, INTERVAL: ((),), STEP: ((),)}
-    if argument.name in (*SAMPLES, PREVIOUS):
+    vectors = dict.fromkeys((VELOCITY, POSITION, GRAVITY, FRAME_RATE), ((3,),))
+    shapes = {STATE: ATTITUDES, INTERVAL: ((),), STEP: ((),), **vectors}
+    if argument.name in (*SAMPLES, PREVIOUS, *PUSHES):
         most = _MOST_PREVIOUS if argument.name == PREVIOUS else _MOST_SAMPLES
         _require_vectors(argument, most)
     elif argument.name not in shapes:
@@ -173,16 +222,25 @@ def _require_vectors(argument: ForeignArgument, most: int) -> None:
 
 
 def _result(text: str, parameters: list[ForeignArgument]) -> ForeignArgument:
-    """Return the result: the argument `next` or `state`, a field of memory, or a global array."""
-    result = _array(text)
+    """Return a result: the argument `next` or `state`, a field of memory, or a global array; or a translation."""
+    what, equals, place = (part.strip() for part in text.partition("="))
+    result = _array(place if equals else text)
+    meaning = what if equals else result.name.removeprefix(_NEXT)
+    if equals and meaning not in TRANSLATIONS:
+        raise InputError(f"--arguments: {shown(text)} names no result; allowed: {', '.join(TRANSLATIONS)}")
     memories = {argument.name for argument in parameters if argument.type}
     head = result.name.partition(".")[0]
     read_after = result.name.startswith("global ") or ("." in result.name and head in memories)
-    if result.name not in (STATE, NEXT, ROTATION) and not read_after:
+    if result.name not in _ARGUMENTS_OF_RESULTS and not read_after:
         raise InputError(
             f"--arguments: the result {shown(text)} is not known; allowed: next[4], state[4], rotation[3], a field of "
-            "memory, as name.q[4], or a global array, as global q[4]; in place of [4] also [9] and [3][3]"
+            "memory, as name.q[4], or a global array, as global q[4]; in place of [4] also [9] and [3][3]; "
+            f"and {', '.join(f'{name}[3]' for name in TRANSLATIONS)}, or as velocity = name.v[3]"
         )
+    if meaning in TRANSLATIONS:
+        if result.shape != (3,):
+            raise InputError(f"--arguments: the result {shown(text)} has another shape; [3] is needed")
+        return replace(result, meaning=meaning)
     vector = result.shape == (3,) and result.name not in (STATE, NEXT)
     if not vector and (result.shape not in ATTITUDES or result.name == ROTATION):
         raise InputError(
@@ -204,11 +262,58 @@ def _refuse_what_does_not_fit(parameters: list[ForeignArgument], result: Foreign
         raise InputError(
             "--arguments: the result state stands behind the arrow alone; before it, it is needed too"
         )
-    if state is not None and (state.size != result.size or (result.name == STATE and state != result)):
+    if (
+        state is not None
+        and result.size
+        and (state.size != result.size or (result.name == STATE and state != result))
+    ):
         raise InputError(
             f"--arguments: state has {state.size} numbers in the shape {list(state.shape)}, the result {result.size} "
             f"in {list(result.shape)}; they must agree"
         )
+
+
+def _refuse_other_results(
+    parameters: list[ForeignArgument],
+    attitudes: list[ForeignArgument],
+    translations: tuple[ForeignArgument, ...],
+) -> None:
+    """Refuse results beside the attitude, and arguments, that say nothing without each other."""
+    meanings = [each.meaning for each in translations]
+    known = {argument.name: argument for argument in parameters}
+    pushes = [known[name] for name in PUSHES if name in known]
+    if len(attitudes) > 1 or len(set(meanings)) < len(meanings):
+        raise InputError("--arguments: a result stands twice behind the arrow; each is allowed once")
+    if bool(meanings) != (len(pushes) == 1):
+        raise InputError(
+            "--arguments: velocity, position or velocity_change behind the arrow and one of velocity_increments[K][3] "
+            "and forces[K][3] before it need each other"
+        )
+    samples = next(argument for argument in parameters if argument.name in SAMPLES)
+    if pushes and pushes[0].size != samples.size:
+        raise InputError(
+            f"--arguments: {pushes[0].name} has {pushes[0].size} numbers, {samples.name} {samples.size}; "
+            "they must agree"
+        )
+    if VELOCITY in meanings and (not attitudes or attitudes[0].size == 3):
+        raise InputError(
+            "--arguments: a velocity behind the arrow is in reference axes, and needs an attitude there; "
+            "velocity_change[3] is that of a call in body axes"
+        )
+    for name in (POSITION, GRAVITY, VELOCITY):
+        if (name in known or name in meanings) and VELOCITY not in meanings:
+            raise InputError(f"--arguments: {name} needs a velocity behind the arrow")
+    for name in (VELOCITY, POSITION):
+        if name in [each.name for each in translations] and name not in known:
+            raise InputError(
+                f"--arguments: the result {name} stands behind the arrow alone; before it, it is needed too, or "
+                f"{_NEXT}{name}[3] behind it"
+            )
+    if POSITION in known and POSITION not in meanings:
+        raise InputError("--arguments: position stands before the arrow alone; behind it, it is needed too")
+    for name, without in ((STATE, ()), (FRAME_RATE, (ROTATION,))):
+        if name in known and [each for each in attitudes if each.name not in without] == []:
+            raise InputError(f"--arguments: {name} needs an attitude behind the arrow")
 
 
 #: Name of the memory of a function in the text; no other name of the file is like it.
@@ -273,6 +378,8 @@ class ForeignSource:
     init: str = ""
     #: "double" or "float"
     precision: str = "double"
+    #: What its parameters are taken for, where that is read from the source
+    reading: str = ""
 
     def __post_init__(self) -> None:
         checks.choice("precision", self.precision, PRECISIONS)
@@ -333,10 +440,14 @@ def _reset(source: ForeignSource, memory: ForeignArgument | None) -> list[str]:
         )
         lines.append(cleared)
     state = source.arguments.named(STATE)
-    if state:
-        lines.append(
-            f"for (int k = 0; k < {state.size}; ++k) strapgen_state.of.all[k] = (strapgen_number)identity[k];"
-        )
+    place = 0
+    for result in source.arguments.results:
+        if held := source.arguments.before(result):
+            lines.append(
+                f"for (int k = 0; k < {held.size}; ++k) "
+                f"strapgen_{held.name}.of.all[k] = (strapgen_number)identity[{place} + k];"
+            )
+        place += result.size
     if source.init:
         takes = definitions(source.file).get(source.init.rpartition("::")[2], "")
         target = memory or state
@@ -347,15 +458,15 @@ def _reset(source: ForeignSource, memory: ForeignArgument | None) -> list[str]:
 def _before(arguments: ForeignArguments, arrays: list[ForeignArgument]) -> list[str]:
     """Return the statements before a call, which fill the inputs and mark the outputs."""
     lines = []
-    samples = [each for each in (arguments.named(PREVIOUS), arguments.samples) if each]
-    for argument in samples:
+    for argument in arguments.fed:
         lines.append(
             f"for (int k = 0; k < {argument.size}; ++k) "
             f"strapgen_{argument.name}.of.all[k] = (strapgen_number)*input++;"
         )
-    if arguments.result.name in (NEXT, ROTATION):
-        name = f"strapgen_{arguments.result.name}"
-        lines.append(f"for (int k = 0; k < {arguments.elements}; ++k) {name}.of.all[k] = NAN;")
+    for result in arguments.results:
+        held = arguments.before(result)
+        if result.name in _ARGUMENTS_OF_RESULTS and (held is None or held.name != result.name):
+            lines.append(f"for (int k = 0; k < {result.size}; ++k) strapgen_{result.name}.of.all[k] = NAN;")
     for argument in arrays:
         name = f"strapgen_{argument.name}"
         lines.append(f"memset({name}.before, 0x5a, 64); memset({name}.after, 0x5a, 64);")
@@ -370,18 +481,19 @@ def _after(arguments: ForeignArguments, arrays: list[ForeignArgument]) -> list[s
         name = f"strapgen_{argument.name}"
         for side in ("before", "after"):
             lines.append(f"flags |= memcmp({name}.{side}, {name}_before.{side}, 64) != 0;")
-        if argument != arguments.result:
+        if argument.name not in [result.name for result in arguments.results]:
             lines.append(f"flags |= memcmp(&{name}.of, &{name}_before.of, sizeof {name}.of) != 0 ? 2 : 0;")
-    result = arguments.result
-    place = f"strapgen_{result.name}.of.array"
-    if result.name not in (STATE, NEXT, ROTATION):  # a field or a global array, of any type of numbers
-        memory, _, field = result.name.partition(".")
-        place = f"{_MEMORY}.{field}" if field else memory.removeprefix("global ")
-    element = f"({place})[k / 3][k % 3]" if len(result.shape) == 2 else f"({place})[k]"
-    for_all = f"for (int k = 0; k < {arguments.elements}; ++k)"
-    lines.append(f"{for_all} *output++ = (double){element};")
-    if arguments.named(STATE) and not arguments.in_place:
-        lines.append(f"{for_all} strapgen_state.of.all[k] = (strapgen_number){element};")
+    for result in arguments.results:
+        place = f"strapgen_{result.name}.of.array"
+        if result.name not in _ARGUMENTS_OF_RESULTS:  # a field or a global array, of any type of numbers
+            memory, _, field = result.name.partition(".")
+            place = f"{_MEMORY}.{field}" if field else memory.removeprefix("global ")
+        element = f"({place})[k / 3][k % 3]" if len(result.shape) == 2 else f"({place})[k]"
+        for_all = f"for (int k = 0; k < {result.size}; ++k)"
+        lines.append(f"{for_all} *output++ = (double){element};")
+        held = arguments.before(result)
+        if held and held.name != result.name:
+            lines.append(f"{for_all} strapgen_{held.name}.of.all[k] = (strapgen_number){element};")
     return lines
 
 
