@@ -65,6 +65,7 @@ REGISTRATION = Registration(
         "flight-errors": f"{__package__}.systems.flight_errors:FlightErrorsResult",
         "flight": f"{__package__}.systems.system_flight:FlightResult",
         "system-outputs": f"{__package__}.systems.system_runs:SystemCourseResult",
+        "system-certificate": f"{__package__}.systems.system_certificate:SystemCertificateResult",
         "system-comparison": f"{__package__}.systems.system_comparison:SystemComparisonResult",
         "system-study": f"{__package__}.systems.system_study:SystemStudyResult",
         "course": f"{__package__}.courses:CourseResult",
