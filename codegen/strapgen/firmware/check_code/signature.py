@@ -23,6 +23,7 @@ _SIZES = (1, 3, 4, 9)
 #: Options of a compiler that say what is read.
 _OPTIONS_READ = ("-I", "-D", "-U", "-std", "-isystem", "-iquote", "-include")
 _NUMBERS = {"FLOAT": "float", "DOUBLE": "double", "BOOL": "bool"}
+_HIDDEN = ("PRIVATE", "PROTECTED")
 _MOST_LEVELS = 3
 
 
@@ -227,8 +228,8 @@ class SourceReader:
                 )
         return found
 
-    def fields(self, name: str, before: Sequence[str]) -> list[str]:
-        """Return the expressions of the fields of an object, and of its methods that take nothing."""
+    def fields(self, name: str, before: Sequence[str]) -> list[tuple[str, bool]]:
+        """Return fields of an object and its methods that take nothing, each with whether it is public."""
         kind = self.expressions([name], before).get(name)
         return [] if kind is None else [*_fields(kind, name, _MOST_LEVELS)]
 
@@ -322,7 +323,7 @@ def _numbers(kind: Any, expression: str, known: dict[str, Any]) -> _Numbers:
 def _of_fields(kind: Any, expression: str, known: dict[str, Any]) -> _Numbers | None:
     """Return the numbers of an object by its public fields."""
     fields = [each for each in kind.get_fields()]
-    if not fields or any(each.access_specifier.name in ("PRIVATE", "PROTECTED") for each in fields):
+    if not fields or any(each.access_specifier.name in _HIDDEN for each in fields):
         return None
     parts = [(each.spelling, _numbers(each.type, expression, known)) for each in fields]
     if kind.get_declaration().kind.name == "UNION_DECL":
@@ -405,20 +406,21 @@ def _variables(cursor: Any, scope: str) -> Iterator[tuple[str, Any]]:
             yield name, child
 
 
-def _fields(kind: Any, expression: str, levels: int) -> Iterator[str]:
-    """Yield the expressions of the fields of an object, and of its methods that take nothing."""
+def _fields(kind: Any, expression: str, levels: int, *, public: bool = True) -> Iterator[tuple[str, bool]]:
+    """Yield fields of an object and its methods that take nothing, each with whether it is public."""
     record = kind.get_canonical()
     if record.kind.name != "RECORD" or not levels:
         return
     for field in record.get_fields():
+        open_ = public and field.access_specifier.name not in _HIDDEN
         name = f"{expression}.{field.spelling}" if field.spelling else expression
-        if field.spelling and field.access_specifier.name not in ("PRIVATE", "PROTECTED"):
-            yield name
-        yield from _fields(field.type, name, levels - 1)
+        if field.spelling:
+            yield name, open_
+        yield from _fields(field.type, name, levels - 1, public=open_)
     for child in record.get_declaration().get_children():
         is_method = child.kind.name == "CXX_METHOD" and child.access_specifier.name == "PUBLIC"
         if is_method and not [*child.get_arguments()] and child.result_type.kind.name != "VOID":
-            yield f"{expression}.{child.spelling}()"
+            yield f"{expression}.{child.spelling}()", public
 
 
 def _of_system(cursor: Any) -> bool:
