@@ -235,6 +235,7 @@ DRAWN = {
     "orders": "paths/paper",
     "bounds": "paths/firmware",
     "word-length": "fixed-point",
+    "flight-polar": "flights",
 }
 
 
