@@ -65,7 +65,7 @@ Project = Annotated[
     option(
         "--project",
         metavar="KIND",
-        help="In C: write a project of this kind that builds and tests it: cmake.  "
+        help="In C: write a project that builds and tests it: cmake, zephyr, esp-idf, platformio, arduino or python.  "
         f"[without a value: {project_kinds.DEFAULT}]",
         panel="Output",
         read=project_kinds.read_kind,
