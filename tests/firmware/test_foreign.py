@@ -436,7 +436,7 @@ def test_the_page_of_the_examples_names_every_fault_as_the_command_does(check):
         (f"euler {COMMAND}", "--function goes with a file in C"),
         (
             f"{PLACE}/correct.c {COMMAND} --method rk4",
-            "--method goes with an algorithm of strapgen; .* is a file in C",
+            "--method goes with an algorithm of strapgen; .* is code of your own",
         ),
         (
             f"{PLACE}/correct.c {COMMAND} --sense body",

@@ -19,6 +19,8 @@ from strapgen.ir.exceptions import InputError
 if TYPE_CHECKING:
     from strapgen.firmware.check_code.conformance import Finding
     from strapgen.firmware.check_code.foreign import ForeignStep
+    from strapgen.firmware.check_code.foreign_arguments import ForeignSource
+    from strapgen.firmware.check_code.interpreted import InterpretedSource
 
 _Text = str | None
 
@@ -113,30 +115,38 @@ class ForeignOptions:
     def step(self, file: str) -> ForeignStep:
         """Return the function of a file, compiled."""
         from strapgen.firmware.check_code.foreign import INTERVAL, Convention, ForeignStep
-        from strapgen.firmware.check_code.foreign_arguments import RATES, ForeignSource, read_arguments
+        from strapgen.firmware.check_code.foreign_arguments import RATES
 
-        if self.function is None or self.arguments is None:
-            missing = "--function" if self.function is None else "--arguments"
-            raise InputError(
-                f'{file} needs {missing}; --function NAME --arguments "state[4], increments[2][3] -> next[4]" '
-                "is an example"
-            )
-        arguments = read_arguments(self.arguments)
+        source = self._source(file)
+        arguments = source.arguments
         if self.scalar is not None and arguments.elements != 4:
             raise InputError(
                 f"--scalar {self.scalar} goes with a result of four elements; this one has {arguments.elements}"
             )
         convention = Convention(self.scalar or "last", self.sense or "body-to-reference")
         takes = self.input or ("rates" if arguments.named(RATES) else "increments")
-        source = ForeignSource(
-            Path(file), self.function, arguments, self.init or "", self.precision or "double"
-        )
         interval = INTERVAL if self.sample_hz is None else 1 / self.sample_hz
         gravity, frame = (
             None if vector is None else tuple(map(float, vector))
             for vector in (self.gravity_m_s2, self.frame_rate_rad_s)
         )
         return ForeignStep(source, convention, takes, interval, gravity, frame)
+
+    def _source(self, file: str) -> ForeignSource | InterpretedSource:
+        """Return the function with its arguments."""
+        from strapgen.firmware.check_code.foreign_arguments import ForeignSource, read_arguments
+        from strapgen.firmware.check_code.interpreted import interpreted_source, is_callable
+
+        init, precision = self.init or "", self.precision or "double"
+        if is_callable(file):
+            return interpreted_source(file, self.function, self.arguments, init, precision)
+        if self.function is None or self.arguments is None:
+            missing = "--function" if self.function is None else "--arguments"
+            raise InputError(
+                f'{file} needs {missing}; --function NAME --arguments "state[4], increments[2][3] -> next[4]" '
+                "is an example"
+            )
+        return ForeignSource(Path(file), self.function, read_arguments(self.arguments), init, precision)
 
 
 @grouped
@@ -162,14 +172,16 @@ def check(
     """
     output.check(algorithm, *method.files)
     from strapgen.firmware.check_code.foreign_arguments import FOREIGN_SUFFIXES, is_foreign
+    from strapgen.firmware.check_code.interpreted import is_callable
 
-    if is_foreign(algorithm):
-        _refuse(stated(method), f"goes with an algorithm of strapgen; {algorithm} is a file in C or C++")
+    if is_foreign(algorithm) or is_callable(algorithm):
+        _refuse(stated(method), f"goes with an algorithm of strapgen; {algorithm} is code of your own")
         _check_foreign(algorithm, foreign, output)
     else:
         _refuse(
             stated(foreign),
-            f"goes with a file in C or C++ ({', '.join(FOREIGN_SUFFIXES)}); {algorithm} is none",
+            f"goes with a file in C or C++ ({', '.join(FOREIGN_SUFFIXES)}), one in MATLAB or package.module:function; "
+            f"{algorithm} is none",
         )
         _check_step(algorithm, method, output)
 

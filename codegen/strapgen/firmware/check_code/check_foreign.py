@@ -110,6 +110,8 @@ class ForeignResult(Result):
     coefficients: tuple[MeasuredCoefficient, ...] = ()
     #: What they correct of the drift on coning to leading order, 1 if they are right
     coefficient_ratio: float | None = None
+    #: What its parameters are taken for
+    reading: str = field(default="", metadata=INTERNAL)
 
     @property
     def holds(self) -> bool:
@@ -122,7 +124,8 @@ class ForeignResult(Result):
 
     def text(self) -> str:
         """Return the findings, a line each, and the likely cause of a failure."""
-        lines = [f"{self.file}: {self.function}", "", *map(finding_text, self.findings)]
+        reading = [self.reading] if self.reading else []
+        lines = [f"{self.file}: {self.function}", *reading, "", *map(finding_text, self.findings)]
         return "\n".join([*lines, *(["", f"likely cause: {self.cause}"] if self.cause else [])])
 
 
@@ -160,6 +163,7 @@ class _Check:
             None if self.drift is None else tuple(map(float, self.drift)),
             self.coefficients,
             self.ratio,
+            self.step.source.reading,
         )
 
     def findings(self) -> Iterator[Finding]:

@@ -13,12 +13,13 @@ import re
 import signal
 import subprocess
 import sys
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
+from functools import partial
 from itertools import accumulate, dropwhile
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,6 +46,9 @@ from strapgen.run import compiler
 from strapgen.run.backends import evaluator
 from strapgen.run.increments import windows
 from strapgen.storage import cache, drafts
+
+if TYPE_CHECKING:
+    from strapgen.firmware.check_code.interpreted import InterpretedSource
 
 Array = NDArray[np.float64]
 SCALARS = ("last", "first")
@@ -182,7 +186,7 @@ class ForeignRun:
 class ForeignStep:
     """A user's function that is compiled, and how it is fed."""
 
-    source: ForeignSource
+    source: ForeignSource | InterpretedSource
     convention: Convention = Convention()
     #: "increments" in rad, or "rates" in rad/s, which are the means over the time between samples, or "rates-
     #: at-ends", which are those at the end of each
@@ -193,7 +197,8 @@ class ForeignStep:
     #: handed; None where nothing is stated
     gravity: tuple[float, ...] | None = None
     frame_rate: tuple[float, ...] | None = None
-    module: Path = field(init=False)
+    #: Calls the function once for each row, see `run_calls`
+    calls: Callable[[Any, Any], ForeignRun] = field(init=False, compare=False, repr=False)
 
     def __post_init__(self) -> None:
         checks.choice("input", self.takes, INPUTS)
@@ -201,12 +206,16 @@ class ForeignStep:
             raise InputError(
                 f"--input {self.takes} contradicts the argument rates; --input {RATES} or {ENDS} fits it"
             )
-        arguments = self.source.arguments
+        arguments, source = self.source.arguments, self.source
         if self.gravity is not None and VELOCITY not in arguments.meanings:
             raise InputError("--gravity-m-s2 goes with a velocity behind the arrow of --arguments")
         if self.frame_rate is not None and arguments.elements <= 3:
             raise InputError("--frame-rate-rad-s goes with an attitude behind the arrow of --arguments")
-        object.__setattr__(self, "module", compile_foreign(self.source))
+        if isinstance(source, ForeignSource):
+            calls: Callable[[Any, Any], ForeignRun] = partial(run_foreign, compile_foreign(source))
+        else:
+            calls = source.run
+        object.__setattr__(self, "calls", calls)
 
     @property
     def samples(self) -> int:
@@ -251,7 +260,7 @@ class ForeignStep:
         rows = np.concatenate([self._rows(segment) for segment in segments])
         elements = arguments.elements
         identity = np.concatenate([read.identity(elements), np.zeros(arguments.numbers - elements)])
-        done = run_foreign(self.module, identity, rows)
+        done = self.calls(identity, rows)
         if not done.stopped and not np.abs(done.outputs).max() < _LARGEST:  # not finite: no number compares
             done = replace(
                 done, stopped="it leaves no finite numbers in its result, or does not write all of it"
@@ -334,7 +343,26 @@ def compile_foreign(source: ForeignSource) -> Path:
 
 
 def run_foreign(module: Path, identity: Any, rows: Any) -> ForeignRun:
-    """Call a compiled function once for each row, in a process of its own.
+    """Call a compiled function once for each row, see `run_calls`."""
+    runner = str(Path(__file__).with_name("foreign_runner.py"))
+    with cache.loadable(module) as (path, descriptor):
+        handed = [] if path == str(module) else [descriptor]
+        return run_calls([sys.executable, "-P", runner, path], identity, rows, handed)
+
+
+def run_calls(
+    command: Sequence[str],
+    identity: Any,
+    rows: Any,
+    descriptors: Sequence[int] = (),
+    patience: float | None = None,
+    **files: str,
+) -> ForeignRun:
+    """Have a command, in a process of its own, call a function once for each row.
+
+    `command` gets two more words, a folder and the number of rows. The folder holds the doubles of `identity` and
+    `input`, and further `files`; the command writes `output`, and `flags` last. What it refuses it says in `refused`,
+    and why the function ended early in `stopped`.
 
     `identity` (elements,): the state that a run begins with. `rows` (N, 3 + numbers): for each call whether a
     run begins, the sampling interval in s, the duration of the call in s, and the numbers of its arguments, the
@@ -342,37 +370,38 @@ def run_foreign(module: Path, identity: Any, rows: Any) -> ForeignRun:
     """
     values = np.ascontiguousarray(rows, np.float64)
     start = np.ascontiguousarray(identity, np.float64)
-    nothing = np.empty((0, start.size))
+    nothing, seconds = np.empty((0, start.size)), PATIENCE if patience is None else patience
     with drafts.temporary_folder() as folder:
         (folder / "input").write_bytes(values.tobytes())
         (folder / "identity").write_bytes(start.tobytes())
-        command = [sys.executable, "-P", str(Path(__file__).with_name("foreign_runner.py"))]
+        for name, text in files.items():
+            (folder / name).write_text(text, encoding="utf-8", newline="\n")
         try:
-            with cache.loadable(module) as (path, descriptor):
-                done = subprocess.run(
-                    [*command, path, str(folder), str(len(values))],
-                    cwd=folder,
-                    pass_fds=[] if path == str(module) else [descriptor],
-                    stdin=subprocess.DEVNULL,
-                    stdout=subprocess.DEVNULL,
-                    stderr=subprocess.DEVNULL,
-                    timeout=PATIENCE,
-                    check=False,
-                )
-        except subprocess.TimeoutExpired:
-            return ForeignRun(nothing, f"{len(values)} calls have not come to an end in {PATIENCE} s")
-        unloaded = folder / "unloaded"
-        if unloaded.is_file():
-            reason = unloaded.read_text(encoding="utf-8").rpartition(path)[2].strip(": ")
-            raise CompilerError(
-                f"the function cannot be linked: {reason}; include the file that defines it in the one to check"
+            done = subprocess.run(
+                [*command, str(folder), str(len(values))],
+                cwd=folder,
+                pass_fds=descriptors,
+                stdin=subprocess.DEVNULL,
+                stdout=subprocess.DEVNULL,
+                stderr=subprocess.DEVNULL,
+                timeout=seconds,
+                check=False,
             )
-        flags = folder / "flags"
-        if done.returncode or not flags.is_file():
-            return ForeignRun(nothing, _reason(done.returncode))
-        bits = int(flags.read_text(encoding="utf-8"))
+        except subprocess.TimeoutExpired:
+            return ForeignRun(nothing, f"{len(values)} calls have not come to an end in {seconds} s")
+        said = {name: _line(folder / name) for name in ("refused", "stopped", "flags")}
+        if said["refused"]:
+            raise CompilerError(said["refused"])
+        if done.returncode or not said["flags"]:
+            return ForeignRun(nothing, said["stopped"] or _reason(done.returncode))
+        bits = int(said["flags"])
         outputs = np.frombuffer((folder / "output").read_bytes()).reshape(len(values), start.size)
     return ForeignRun(outputs, "", bool(bits & 1), bool(bits & 2))
+
+
+def _line(file: Path) -> str:
+    """Return the text of a file as one line; "" if there is none."""
+    return " ".join(file.read_text(encoding="utf-8", errors="replace").split()) if file.is_file() else ""
 
 
 def _reason(status: int) -> str:

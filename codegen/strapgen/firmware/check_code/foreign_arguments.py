@@ -378,6 +378,8 @@ class ForeignSource:
     init: str = ""
     #: "double" or "float"
     precision: str = "double"
+    #: What its parameters are taken for, where that is read from the source
+    reading: str = ""
 
     def __post_init__(self) -> None:
         checks.choice("precision", self.precision, PRECISIONS)
