@@ -169,7 +169,12 @@ def _is_whole(header: Path) -> bool:
     if not header.is_file():
         return False
     command = command_of(text_of(header)) or ""
-    return command.startswith(_COMMANDS) and not re.search(" --(with-runs$|project)", command)
+    return command.startswith(_COMMANDS) and not is_beside(command)
+
+
+def is_beside(command: str) -> bool:
+    """Return whether the file of a command lies beside the C: a loop over runs, or a part of a project."""
+    return re.search(" --(with-runs$|project)", command) is not None
 
 
 def verify(
