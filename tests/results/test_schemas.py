@@ -33,6 +33,7 @@ COMMANDS = {
     "simulate dcm --recording tests/data/increments.csv --title a": "attitude",
     "log tests/data/increments.csv": "log",
     "certify euler --recording tests/data/increments.csv": "certificate",
+    "certify two-speed-euler --recording examples/inertial_log.csv": "system-certificate",
     f"compare euler --method rk1,rk2 --backend numpy,c {RUN}": "comparison",
     "compare euler,dcm --method rk1 --recording tests/data/increments.csv": "spread",
     "converge euler --method rk1 --steps 1/2,1/4 --duration 1 --backend numpy": "convergence",

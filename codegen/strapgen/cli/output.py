@@ -65,7 +65,7 @@ Project = Annotated[
     option(
         "--project",
         metavar="KIND",
-        help="In C: write a project that builds and tests it: cmake, zephyr, esp-idf, platformio, arduino or python.  "
+        help="In C: write a project for a build: cmake, zephyr, esp-idf, platformio, arduino, python, fmu2 or fmu3.  "
         f"[without a value: {project_kinds.DEFAULT}]",
         panel="Output",
         read=project_kinds.read_kind,

@@ -18,7 +18,7 @@ class Kind(NamedTuple):
     """A kind of project: what it is, and the function that writes its files."""
 
     title: str
-    #: "module:function" of the function that returns the files of a `Project` of firmware by path
+    #: "module:function" of the function that returns the files of a `Project` of firmware by path, or of a `Unit`
     place: str
     #: Targets that do not go with it, each with the reason
     refuses: Mapping[str, str] = MappingProxyType({})

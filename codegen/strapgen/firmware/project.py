@@ -12,6 +12,7 @@ from typing import Any
 from strapgen import pipeline, registration
 from strapgen.catalogue import Choice
 from strapgen.cli.project_kinds import DEFAULT, kinds
+from strapgen.firmware.fmu import archive, units
 from strapgen.firmware.vectors import vectors_of_choice
 from strapgen.firmware.vectors_c import VectorTable, loop_calls, table_files
 from strapgen.ir.exceptions import InputError
@@ -109,14 +110,16 @@ def project_files(
     naming: Naming = UNNAMED,
     *,
     kind: str = DEFAULT,
-) -> dict[str, str]:
+) -> Mapping[str, str | bytes]:
     """Return the files of a project around the C of a kernel."""
-    table = vectors_of_choice(choice, target, settings, kinds()[kind].vectors, naming=naming)
-    sources = table.sources
+    sources = pipeline.compile(choice, target, settings, naming)
     command = f"strapgen generate {sources.info.arguments} --target {target}"
     if sources.fixed is not None:
         command += f" {options(sources.fixed.settings, sources.function.inputs)}"
     command = with_kind(command, kind)
+    if kind in archive.VERSIONS:
+        return archive.project_files(units.of_kernel(choice, sources, settings, command), kind)
+    table = vectors_of_choice(choice, target, settings, kinds()[kind].vectors, naming=naming)
     motion: dict[str, str] = {}
     steps = sources.attitude_step is not None and sources.function.inputs[-1].name == "increments"
     kernel = _conversion(sources)
@@ -163,14 +166,8 @@ def coning_run(sources: Sources, conversion: str) -> MotionRun:
     if sources.fixed is not None:
         argument = sources.fixed.inputs[-1]
         largest = argument.high * argument.unit / PART
-        step = stated_step(sources.fixed.settings)
+        step = units.stated_step(sources.fixed.settings, samples) or _STEP
     return MotionRun(decimal(largest * samples / step), decimal(step, 15), STEPS, conversion)
-
-
-def stated_step(settings: Settings) -> Fraction:
-    """Return the step in s that settings state, or the one of a run that states none."""
-    words = settings.stated.split()
-    return Fraction(words[words.index("--step") + 1]) if "--step" in words else _STEP
 
 
 def decimal(value: Fraction, digits: int = 2) -> str:
@@ -317,15 +314,15 @@ def is_yours(name: str) -> bool:
     return Path(name).suffix not in _GENERATED or Path(name).name == "main.c"
 
 
-def refuse_changed(folder: Path, files: Mapping[str, str], force: bool = False) -> None:
+def refuse_changed(folder: Path, files: Mapping[str, str | bytes], force: bool = False) -> None:
     """Refuse to overwrite files that a user has written or changed; `force` allows it.
 
     That is a main.c or a file that describes the project and differs, and any other that strapgen has not generated.
     """
     for name, text in () if force else files.items():
-        path = folder / name
-        content = path.read_bytes() if path.is_file() else text.encode()
-        if content == text.encode():
+        path, new = folder / name, text.encode() if isinstance(text, str) else text
+        content = path.read_bytes() if path.is_file() else new
+        if content == new:
             continue
         if is_yours(name):
             why = "differs from what --project writes"

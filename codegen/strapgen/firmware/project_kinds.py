@@ -21,4 +21,6 @@ KINDS = {
     "python": Kind(
         "package of Python, which compiles the C by cffi", f"{_PLACE}.python_package:python_files"
     ),
+    "fmu2": Kind("unit for co-simulation by FMI 2.0", f"{_PLACE}.fmu.archive:project_files"),
+    "fmu3": Kind("unit for co-simulation by FMI 3.0", f"{_PLACE}.fmu.archive:project_files"),
 }

@@ -13,6 +13,7 @@ from strapgen import pipeline
 from strapgen.catalogue import Choice
 from strapgen.cli.project_kinds import DEFAULT, kinds
 from strapgen.firmware import project
+from strapgen.firmware.fmu import archive, units
 from strapgen.firmware.project import MotionRun, Project, two_speed_main
 from strapgen.firmware.project import refuse_changed as refuse_changed
 from strapgen.firmware.vectors import MODEL, SEED, ProgramEvaluator, vectors_of_choice
@@ -43,12 +44,15 @@ def project_files(
     settings: Settings | None = None,
     *,
     kind: str = DEFAULT,
-) -> dict[str, str]:
+) -> Mapping[str, str | bytes]:
     """Return the files of a project around the C of an algorithm in two speeds."""
+    command = project.with_kind(two_speed_sources.command(algorithm, sculling, target, settings), kind)
+    if kind in archive.VERSIONS:
+        unit = units.of_two_speeds(algorithm, sculling, target, settings, command)
+        return archive.project_files(unit, kind)
     whole = two_speed_sources.sources(algorithm, sculling, target, settings)
     loops = two_speed_sources.loops(algorithm, sculling, target, settings)
     system = two_speed_sources.description(algorithm, sculling).system
-    command = project.with_kind(two_speed_sources.command(algorithm, sculling, target, settings), kind)
     together = cycle_files(_cycle_table(whole, LoopSources(loops, system), command))
     tables = []
     for loop in loops:

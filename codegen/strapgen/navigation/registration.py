@@ -63,6 +63,7 @@ REGISTRATION = Registration(
         "system": f"{__package__}.systems.system_report:SystemResult",
         "flight": f"{__package__}.systems.system_flight:FlightResult",
         "system-outputs": f"{__package__}.systems.system_runs:SystemCourseResult",
+        "system-certificate": f"{__package__}.systems.system_certificate:SystemCertificateResult",
         "system-comparison": f"{__package__}.systems.system_comparison:SystemComparisonResult",
         "system-study": f"{__package__}.systems.system_study:SystemStudyResult",
         "course": f"{__package__}.courses:CourseResult",

@@ -163,7 +163,7 @@ class _Check:
             None if self.drift is None else tuple(map(float, self.drift)),
             self.coefficients,
             self.ratio,
-            self.step.source.reading,
+            self.step.reading,
         )
 
     def findings(self) -> Iterator[Finding]:
@@ -329,7 +329,7 @@ class _Check:
             yield shown
             proved = proved if shown.holds else min(proved, 2)
         seen = ladder.ladder(self.step, runs["order"], standard)
-        if self.step.source.precision == "float":
+        if self.step.source.precision != "double":
             order, self.order = ladder.order_in_float(self.step, seen, standard, proved)
         else:
             order, self.order = ladder.order_on_ladder(self.step, seen)

@@ -8,7 +8,7 @@ import subprocess
 import sys
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 from strapgen.firmware.check_code import foreign
 from strapgen.firmware.check_code.foreign_arguments import PRECISIONS, ForeignArguments, read_arguments
@@ -56,6 +56,9 @@ class InterpretedSource:
     precision: str = "double"
     #: Names of the parameters where they say what they are
     names: tuple[str, ...] = ()
+    #: Calls to a result, which is one here
+    publishes: ClassVar[int] = 1
+    is_integer: ClassVar[bool] = False
 
     def run(self, identity: Any, rows: Any) -> foreign.ForeignRun:
         """Call the function once for each row, see `strapgen.firmware.check_code.foreign.run_calls`."""
@@ -139,7 +142,13 @@ def interpreted_source(
         names, arguments = _read(name, parameters)
     if re.search(r"->\s*self\.", arguments):
         arguments = f"object *self, {arguments}"
-    return InterpretedSource(file, name, read_arguments(arguments), init, precision, names)
+    known = read_arguments(arguments)
+    for each in (*known.parameters, *known.results):
+        if not each.shape and not each.type and each.name not in ("dt", "step"):
+            raise InputError(
+                f"--arguments: {each.name} needs its numbers, as state[4], for code that declares none"
+            )
+    return InterpretedSource(file, name, known, init, precision, names)
 
 
 def _read(function: str, parameters: list[str]) -> tuple[tuple[str, ...], str]:

@@ -128,11 +128,9 @@ def system(
 
     errors = bounds(fit)
     sources = unit(fit, needs, errors, command)
-    system = fit.description.system
     place = replace(output, out=out, with_runs=with_runs)
     place.require_language(target)
-    outputs = {name: system.cell(name).signal.size for name in system.outputs}
-    files = place.files(sources, "whole.project", sources, outputs)
+    files = place.files(sources, "whole.project", sources, fit)
     if output.check:
         place.show_difference(files, format)
         return

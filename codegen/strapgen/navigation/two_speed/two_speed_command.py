@@ -79,7 +79,10 @@ def _result(sources: Sources, loops: Sequence[Sources], written: Sequence[Path],
     places = {path.name: str(path) for path in written}
     functions = [
         GeneratedSources.of(
-            Choice(loop.kernel), loop, sources.target, [places[name] for name in loop.step_files]
+            Choice(loop.kernel),
+            loop,
+            sources.target,
+            [places[name] for name in loop.step_files if name in places],
         )
         for loop in loops
     ]
