@@ -51,6 +51,7 @@ SECTIONS = (
                 "fixed-point",
                 "design",
                 "generated-code",
+                "delivery",
                 "microcontrollers",
                 "evidence",
             ),
