@@ -7,6 +7,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 import json
 import math
 import os
@@ -43,6 +44,8 @@ if TYPE_CHECKING:
 
 #: Most cases of one study.
 _MOST_CASES = 5000
+#: Longest word whose states a double holds, and instants at which a run is certified, about.
+_LONGEST_CERTIFIED, _INSTANTS = 53, 200
 
 
 @dataclass(frozen=True)
@@ -108,8 +111,8 @@ class Outcome(Record):
     drift_deg : float or None
         Drift from the truth; None if the run left the range of its format.
     rounding_deg : float or None
-        Effect of the arithmetic: the angle from the same algorithm in double on the same rounded increments; None if
-        the run left the range of its format.
+        Effect of the arithmetic: the angle from the same algorithm in exact arithmetic on the same rounded increments,
+        at up to some hundred instants; None if the run left the range of its format.
     quantization_deg : float
         Effect of rounded increments: the angle between the runs in double on rounded and on exact increments.
     truncation_deg : float
@@ -119,6 +122,9 @@ class Outcome(Record):
     expected_deg : float or None
         Root mean square of the angle that pulses cause at the end of the run, if the errors of the counted angles are
         independent; None without pulses. See `quantization_noise`.
+    rounding_radius_deg : float or None
+        Radius of the ball that holds `rounding_deg`, see `certify`; None where that is the angle from the run in double
+        at any step: without python-flint, in words of more than 53 bits, and from a quarter turn on.
 
     Examples
     --------
@@ -136,6 +142,7 @@ class Outcome(Record):
     truncation_deg: float
     bound_deg: float | None
     expected_deg: float | None = None
+    rounding_radius_deg: float | None = None
 
     __repr__ = short_repr
 
@@ -296,7 +303,8 @@ def run_case(case: Case) -> Outcome:
     True
     """
     motion = Path(case.motion).read_bytes() if is_file(case.motion) else b""
-    return cache.stored("studies", [json.dumps(asdict(case), sort_keys=True), motion], lambda: _run(case))
+    parts: list[str | bytes] = [json.dumps(asdict(case), sort_keys=True), motion, str(_has_balls())]
+    return cache.stored("studies", parts, lambda: _run(case))
 
 
 def _run(case: Case) -> Outcome:
@@ -319,10 +327,13 @@ def _run(case: Case) -> Outcome:
     def largest(computed: Any, other: Any) -> float:
         return math.degrees(float(np.linalg.norm(drift_between(computed, other), axis=-1).max()))
 
-    drift = rounding = None
+    drift = rounding = radius = None
     try:
-        states = attitude(fixed, fixed.propagate(rounded))
-        drift, rounding = largest(states, truth), largest(states, same_attitude)
+        states = fixed.propagate(rounded)
+        computed = attitude(fixed, states)
+        drift, rounding = largest(computed, truth), largest(computed, same_attitude)
+        if case.word <= _LONGEST_CERTIFIED and (found := _certified(choice, states, rounded)) is not None:
+            rounding, radius = (math.degrees(value) for value in found)
     except InputError:  # in a short word without error feedback the state leaves its range
         pass
     bound = certified_angle(fixed, rounded, same)
@@ -334,7 +345,34 @@ def _run(case: Case) -> Outcome:
         largest(plain_attitude, truth),
         None if bound is None else math.degrees(bound),
         expected_noise(case, math.radians(pulse), _within(choice, exact)) if pulse else None,
+        radius,
     )
+
+
+def _certified(
+    choice: Choice, states: NDArray[np.float64], samples: NDArray[np.float64]
+) -> tuple[float, float] | None:
+    """Return the largest angle in rad that rounding has made of states, and the radius of its ball.
+
+    None without python-flint, and where an angle reaches a quarter turn.
+    """
+    if not _has_balls():
+        return None
+    from strapgen.lab.certificate.certificate import roundings
+
+    steps, inside = len(samples), choice.increments_per_step
+    each = next(n for n in range(-(-steps // _INSTANTS), steps + 1) if steps % n == 0)
+    blocks = [samples[k : k + each] for k in range(0, steps, each)]
+    rows = [np.concatenate([part[:, :inside].reshape(-1, 3), part[-1, inside:]]) for part in blocks]
+    angles = [one.angle for one in roundings(choice, each, [*states[::each]], rows)]
+    if not all(math.isfinite(angle.size) for angle in angles):
+        return None
+    largest = max(angles, key=lambda angle: angle.size)
+    return largest.size, largest.radius
+
+
+def _has_balls() -> bool:
+    return importlib.util.find_spec("flint") is not None
 
 
 def _within(choice: Choice, increments: NDArray[np.float64]) -> NDArray[np.float64]:
