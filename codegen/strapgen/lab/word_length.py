@@ -7,7 +7,6 @@
 
 from __future__ import annotations
 
-import importlib.util
 import json
 import math
 import os
@@ -26,6 +25,7 @@ from strapgen.ir.exceptions import InputError
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.notebook_display import short_repr
 from strapgen.ir.renamed import renamed_parameters
+from strapgen.lab.certificate.largest_rounding import has_balls, largest_rounding
 from strapgen.lab.comparison import certified_angle
 from strapgen.lab.motions.motion_names import is_file
 from strapgen.lab.motions.motions import Motion
@@ -44,8 +44,6 @@ if TYPE_CHECKING:
 
 #: Most cases of one study.
 _MOST_CASES = 5000
-#: Longest word whose states a double holds, and instants at which a run is certified, about.
-_LONGEST_CERTIFIED, _INSTANTS = 53, 200
 
 
 @dataclass(frozen=True)
@@ -303,7 +301,7 @@ def run_case(case: Case) -> Outcome:
     True
     """
     motion = Path(case.motion).read_bytes() if is_file(case.motion) else b""
-    parts: list[str | bytes] = [json.dumps(asdict(case), sort_keys=True), motion, str(_has_balls())]
+    parts: list[str | bytes] = [json.dumps(asdict(case), sort_keys=True), motion, str(has_balls())]
     return cache.stored("studies", parts, lambda: _run(case))
 
 
@@ -332,7 +330,7 @@ def _run(case: Case) -> Outcome:
         states = fixed.propagate(rounded)
         computed = attitude(fixed, states)
         drift, rounding = largest(computed, truth), largest(computed, same_attitude)
-        if case.word <= _LONGEST_CERTIFIED and (found := _certified(choice, states, rounded)) is not None:
+        if (found := largest_rounding(fixed, states, rounded)) is not None:
             rounding, radius = (math.degrees(value) for value in found)
     except InputError:  # in a short word without error feedback the state leaves its range
         pass
@@ -347,32 +345,6 @@ def _run(case: Case) -> Outcome:
         expected_noise(case, math.radians(pulse), _within(choice, exact)) if pulse else None,
         radius,
     )
-
-
-def _certified(
-    choice: Choice, states: NDArray[np.float64], samples: NDArray[np.float64]
-) -> tuple[float, float] | None:
-    """Return the largest angle in rad that rounding has made of states, and the radius of its ball.
-
-    None without python-flint, and where an angle reaches a quarter turn.
-    """
-    if not _has_balls():
-        return None
-    from strapgen.lab.certificate.certificate import roundings
-
-    steps, inside = len(samples), choice.increments_per_step
-    each = next(n for n in range(-(-steps // _INSTANTS), steps + 1) if steps % n == 0)
-    blocks = [samples[k : k + each] for k in range(0, steps, each)]
-    rows = [np.concatenate([part[:, :inside].reshape(-1, 3), part[-1, inside:]]) for part in blocks]
-    angles = [one.angle for one in roundings(choice, each, [*states[::each]], rows)]
-    if not all(math.isfinite(angle.size) for angle in angles):
-        return None
-    largest = max(angles, key=lambda angle: angle.size)
-    return largest.size, largest.radius
-
-
-def _has_balls() -> bool:
-    return importlib.util.find_spec("flint") is not None
 
 
 def _within(choice: Choice, increments: NDArray[np.float64]) -> NDArray[np.float64]:
