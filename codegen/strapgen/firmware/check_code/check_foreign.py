@@ -41,7 +41,10 @@ from strapgen.firmware.check_code.probes import (
     rest_segments,
     sizes_in_words,
 )
+from strapgen.firmware.check_code.remedy import Remedy, remedy
 from strapgen.firmware.check_code.rotation import rotation, rotation_segments
+from strapgen.firmware.check_code.upsets import upsets
+from strapgen.ir.renamed import renamed
 from strapgen.lab.motions.motions import motion
 from strapgen.results.records import INTERNAL, Properties, entry, properties
 from strapgen.results.result import Result
@@ -85,11 +88,12 @@ def without_words(findings: Sequence[Finding]) -> list[MeasuredCheck]:
     return [MeasuredCheck(finding.name, finding.holds, finding.measured) for finding in findings]
 
 
+@renamed(drift_by_axis_deg_h="drift_axes_deg_h")
 @dataclass(frozen=True)
 class ForeignResult(Result):
     """The findings on a user's function."""
 
-    computed: ClassVar[Properties] = properties(holds=entry())
+    computed: ClassVar[Properties] = properties(holds=entry(), of_old_name=entry(key="drift_by_axis_deg_h"))
 
     file: str
     function: str = field(metadata=INTERNAL)
@@ -105,13 +109,26 @@ class ForeignResult(Result):
     #: The likely cause of what fails; None if nothing does, or the cause is not known
     cause: str | None
     #: The drift about x, y and z of the reference axes in deg/h; its length is the magnitude
-    drift_by_axis_deg_h: tuple[float, ...] | None = None
+    drift_axes_deg_h: tuple[float, ...] | None = None
     #: Those of cross products that are seen or wanted; none where samples are rates at instants
     coefficients: tuple[MeasuredCoefficient, ...] = ()
     #: What they correct of the drift on coning to leading order, 1 if they are right
     coefficient_ratio: float | None = None
+    #: How sure the cause of wrong coefficients is, from 0 to 1; None where it was found otherwise
+    cause_confidence: float | None = None
+    #: What explains them next best
+    next_cause: str | None = None
+    #: Lines of generated C that correct coning on the same samples; None where the coefficients hold
+    replacement: str | None = None
+    #: The command that generates them
+    replacement_command: str | None = None
     #: What its parameters are taken for
     reading: str = field(default="", metadata=INTERNAL)
+
+    @property
+    def of_old_name(self) -> tuple[float, ...] | None:
+        """The same as drift_axes_deg_h, under the name that it had before."""
+        return self.drift_axes_deg_h
 
     @property
     def holds(self) -> bool:
@@ -126,7 +143,15 @@ class ForeignResult(Result):
         """Return the findings, a line each, and the likely cause of a failure."""
         reading = [self.reading] if self.reading else []
         lines = [f"{self.file}: {self.function}", *reading, "", *map(finding_text, self.findings)]
-        return "\n".join([*lines, *(["", f"likely cause: {self.cause}"] if self.cause else [])])
+        if self.cause:
+            sure = ""
+            if self.cause_confidence is not None:
+                sure = f" (confidence {self.cause_confidence:.2f}; next best: {self.next_cause})"
+            lines += ["", f"likely cause: {self.cause}{sure}"]
+        if self.replacement:
+            code = [f"    {line}" for line in self.replacement.splitlines()]
+            lines += ["", f"generated code that corrects coning, of {self.replacement_command}:", *code]
+        return "\n".join(lines)
 
 
 def check_foreign(step: ForeignStep) -> ForeignResult:
@@ -146,10 +171,15 @@ class _Check:
         self.closed: float | None = None
         self.coefficients: tuple[MeasuredCoefficient, ...] = ()
         self.ratio: float | None = None
+        self.sure: tuple[float, str] | None = None
+        self.remedy: Remedy | None = None
+        #: That of the function, once it is known
+        self.convention: Convention | None = None
 
     def outcome(self) -> ForeignResult:
         """Run all checks."""
         findings = tuple(self.findings())
+        findings += tuple(self.upsets(findings))
         failed = any(finding.holds is False for finding in findings)
         cause = "; ".join(dict.fromkeys(self.causes)) if failed and self.causes else None
         return ForeignResult(
@@ -163,6 +193,10 @@ class _Check:
             None if self.drift is None else tuple(map(float, self.drift)),
             self.coefficients,
             self.ratio,
+            self.sure[0] if self.sure else None,
+            self.sure[1] if self.sure else None,
+            self.remedy.code if self.remedy else None,
+            self.remedy.command if self.remedy else None,
             self.step.reading,
         )
 
@@ -193,6 +227,14 @@ class _Check:
             runs[name] = done.segments[place : place + len(part)]
             place += len(part)
         yield from self.measured(convention, runs)
+
+    def upsets(self, found: Sequence[Finding]) -> Iterator[Finding]:
+        """Yield the findings on input that fails and on long runs, once the function is known to work otherwise."""
+        if self.convention is not None:
+            lasts = all(finding.holds for finding in found if finding.name == "norm")
+            for finding, cause in upsets(self.step, self.convention, long=lasts):
+                self.causes.extend([cause] if cause else [])
+                yield finding
 
     def failed(self, name: str, text: str, measured: float | None = None) -> Finding:
         """Return a finding whose text is its own cause."""
@@ -253,6 +295,7 @@ class _Check:
 
     def measured(self, convention: Convention, runs: dict[str, tuple[SegmentRun, ...]]) -> Iterator[Finding]:
         """Yield the findings on all segments."""
+        self.convention = convention
         still = rest(self.step, runs["at rest"])
         yield self.at_rest(still)
         runs = {name: tuple(run.in_resting_frame(still.frame) for run in part) for name, part in runs.items()}
@@ -351,6 +394,9 @@ class _Check:
         holds = coning_causes.corrects_coning(known) and not coning_causes.weights_off(known)
         if (said := coning_causes.cause(known)) is not None:
             self.causes.append(said)
+            self.sure = coning_causes.confidence(known, said)
+        if not holds:
+            self.remedy = remedy(coning_causes.nearest(known)[1])
         by_difference = sorted(self.coefficients, key=lambda each: -abs(each.seen - each.wanted))
         parts = [
             f"d{each.older} x d{each.newer} {each.seen:.4g} ({each.wanted:.4g})"
