@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +14,13 @@ from strapgen.ir.exceptions import InputError
 from strapgen.lab.certificate.balls import column_of, evaluate_single, product_in_pairs
 
 Array = NDArray[np.float64]
+
+
+class Restoring(NamedTuple):
+    """The kernel that orthonormalizes, and the steps of the run from one time to the next."""
+
+    kernel: str
+    every: int
 
 
 class ExactStep:
@@ -42,6 +49,21 @@ class ExactStep:
         turns = evaluate_single(self._transition, values)
         shaped = [np.broadcast_to(turn, blocks * steps).reshape(blocks, steps) for turn in turns]
         return product_in_pairs(self._product, shaped)
+
+    def restored(self, state: Sequence[Any], samples: Array, first: int, restoring: Restoring) -> list[Any]:
+        """Return a state after steps, with exact orthonormalizations between them.
+
+        `samples` (n, samples, 3): increments in rad. `first`: steps of the run before them.
+        """
+        program, begin, state = pipeline.program(choose(restoring.kernel)), 0, [*state]
+        for end in range(1, len(samples) + 1):
+            is_due = (first + end) % restoring.every == 0
+            if is_due or end == len(samples):
+                turn = self.transitions(samples[None, begin:end])
+                state, begin = self.after(state, [column[0] for column in turn]), end
+            if is_due:
+                state = evaluate_single(program, state)
+        return state
 
     def state(self, numbers: NDArray[Any]) -> list[Any]:
         """Return a state of numbers in double as balls."""
