@@ -242,7 +242,9 @@ def _parts(
         row = pulses(row[:, None], taken.pulse)[:, 0]
     rounded, every = _as_taken(backend, row), taken.orthonormalize_every
     kernel = backend.orthonormalization
-    restoring = Restoring(kernel, every) if every and kernel is not None else None
+    # Parameters stay where they are, but for their length.
+    is_matrix = backend.attitude is None
+    restoring = Restoring(kernel, every) if is_matrix and every and kernel is not None else None
     same = np.array_equal(rounded, row)
     lengths, first, parts = np.diff(places), 0, {}
     while first < len(lengths):
@@ -461,7 +463,7 @@ def _joined(
         if rate is not None:
             within = math.nextafter((Angle.of(whole).above + band) * (1 + 1e-12), math.inf)
         matrix, shape = backend.attitude is None, _shape(rounding)
-        is_restored = matrix and any(block.restoring is not None for block in blocks)
+        is_restored = any(block.restoring is not None for block in blocks)
         turned = Angle.of(restoring).size if is_restored else None
     return CertificateResult(
         kernel=backend.kernel,
