@@ -453,6 +453,28 @@ def test_the_page_of_the_examples_names_every_fault_as_the_command_does(check):
             "input 'angles' is not known; allowed: increments, rates, rates-at-ends",
         ),
         ("euler --sample-hz 100", "--sample-hz goes with a file in C"),
+        ("euler --gravity-m-s2 0,0,9.8", "--gravity-m-s2 goes with a file in C"),
+        (
+            f"{PLACE}/correct.c {COMMAND} --gravity-m-s2 0,0,9.8",
+            "--gravity-m-s2 goes with a velocity behind the arrow",
+        ),
+        (f"{PLACE}/correct.c {COMMAND} --gravity-m-s2 9.8", "--gravity-m-s2 is .9.8.; three numbers"),
+        (f"{PLACE}/correct.c {COMMAND} --frame-rate-rad-s 0,0,a", "--frame-rate-rad-s .*a"),
+        (
+            f"{PLACE}/correct.c --function f --frame-rate-rad-s 0,0,1e-5 "
+            "--arguments 'increments[3] -> rotation[3]'",
+            "--frame-rate-rad-s goes with an attitude behind the arrow",
+        ),
+        (
+            f"{PLACE}/correct.c --function f --input rates-at-ends "
+            "--arguments 'rates[3], forces[3] -> next[4], velocity_change[3]'",
+            "--input rates-at-ends goes without a velocity",
+        ),
+        (
+            f"{PLACE}/correct.c --function f "
+            "--arguments 'increments[3], forces[3] -> next[4], next_velocity[3], velocity_change[3]'",
+            "velocity and velocity_change are one result in two forms; one is allowed",
+        ),
         (
             f"{PLACE}/correct.c {COMMAND} --precision half",
             "precision 'half' is not known; allowed: double, float",
