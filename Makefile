@@ -24,7 +24,7 @@ help:
 	@echo "make cost      measure generated/COST.md anew, with the tools of make firmware-tools"
 	@echo "make firmware-tools  on Debian: cross compilers, QEMU and CMake, for strapgen cost and tests"
 	@echo "make evidence-tools  on Debian: the tools above, Frama-C, Gappa, Coq, fuzzers and more processors, for make evidence"
-	@echo "make language-tools  on Debian: compilers of C++ and Rust, and Octave, for the tests of those languages"
+	@echo "make language-tools  on Debian: compilers of C++ and Rust, Eigen and Octave, for the tests of those languages"
 	@echo "make site-tools  on Debian: Chromium and npm, for make docs and the tests of its pages"
 	@echo "make evidence  have independent tools examine the standard catalogue; hold generated/EVIDENCE.md to what they say"
 	@echo "make evidence-page  the same, and write generated/EVIDENCE.md anew"
@@ -84,7 +84,7 @@ evidence-tools: firmware-tools $(READY)
 
 language-tools:
 	apt-get update -qq
-	apt-get install -y -qq --no-install-recommends g++ rustc octave
+	apt-get install -y -qq --no-install-recommends g++ rustc octave libeigen3-dev
 
 # Node's own packages bring npm too.
 site-tools:

@@ -234,6 +234,7 @@ DRAWN = {
     "orders": "paths/paper",
     "bounds": "paths/firmware",
     "word-length": "fixed-point",
+    "flight-polar": "flights",
 }
 
 

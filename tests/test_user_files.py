@@ -133,6 +133,26 @@ def test_reader_refuses_as_the_schema_in_one_line(data):
 
 #: By kind: a file, the command that reads it, and changes of the file with what is said of them.
 WRONG = {
+    "motion": (
+        "examples/courses/circuit.toml",
+        "simulate two-speed-euler --motion FILE --step 0.02 --duration 1",
+        [
+            ('kind = "hold"', 'kind = "wait"', "leg[1].kind 'wait' is not known; allowed: hold, accelerate"),
+            ("duration_s = 20", "", "a leg of kind hold needs duration_s"),
+            ("duration_s = 20", "bank_deg = 3\nduration_s = 20", "a leg of kind hold has no bank_deg; it takes"),
+            ("duration_s = 20", "duration_s = 0", "duration_s is 0; a number above 0"),
+            ("latitude_deg = 47.5", "latitude_deg = 91", "latitude_deg is 91; a number from -90 to 90"),
+            ("latitude_deg = 47.5", 'latitude_deg = "north"', "latitude_deg"),
+            ("heading_deg = 140", "heading_deg = 140\nspeed_m_s = -1", "speed_m_s is -1"),
+            ("bank_deg = 25", "bank_deg = 20\nrate_deg_s = 3", "a turn has bank_deg and rate_deg_s; one of"),
+            ("bank_deg = 25", "bank_deg = 89", "bank_deg is 89; a number above 0 and of at most 80"),
+            ("height_m = 600", "height_m = 70000", "height_m is 70000"),
+            ("speed_m_s = 80", "speed_m_s = 2000", "speed_m_s is 2000"),
+            ("speed_m_s = 80", "speed_m_s = 0", "leg 3: a vehicle that stands does not climb; accelerate first"),
+            ("acceleration_m_s2 = 2\n", "acceleration_m_s2 = 0\n", "acceleration_m_s2 is 0"),
+            ("[start]", "[begin]", "key 'begin' is not known"),
+        ],
+    ),
     "tableau": (
         "codegen/strapgen/catalogue/methods/butcher_tableaux/rk3.toml",
         "tableau FILE",

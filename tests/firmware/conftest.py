@@ -7,20 +7,25 @@ from pathlib import Path
 
 import pytest
 
+from strapgen.firmware.check_code.bridge import read_source
 from strapgen.firmware.check_code.check_foreign import check_foreign
 from strapgen.firmware.check_code.foreign import Convention, ForeignStep
-from strapgen.firmware.check_code.foreign_arguments import ForeignSource, read_arguments
 
 
 @pytest.fixture
 def outcome(tmp_path: Path):
     """Check a function; its step is `step` unless told otherwise."""
 
-    def check(text: str, arguments: str, convention=Convention(), file="a.c", name="step", init="", **more):  # noqa: B008
+    def check(text: str, arguments=None, convention=Convention(), file="a.c", name="step", init="", **more):  # noqa: B008
         (tmp_path / file).write_text(text)
-        source = ForeignSource(
-            tmp_path / file, name, read_arguments(arguments), init, more.pop("precision", "double")
+        how = {key: more.pop(key) for key in ("cflags", "publishes", "sources") if key in more}
+        source = read_source(
+            *(tmp_path / file, name, arguments, init, more.pop("precision", None)),
+            takes=more.get("takes", ""),
+            is_angle_said="angle_unit" in more,
+            **how,
         )
+        more.setdefault("takes", "rates" if source.arguments.named("rates") else "increments")
         if "sample_hz" in more:
             more["interval"] = 1 / Fraction(more.pop("sample_hz"))
         return check_foreign(ForeignStep(source, convention, **more))

@@ -14,9 +14,9 @@ from strapgen import pipeline
 from strapgen.catalogue import choose
 from strapgen.catalogue.methods.coning_coefficients import design
 from strapgen.firmware.check_code import coning_causes as causes
+from strapgen.firmware.check_code.bridge import read_source
 from strapgen.firmware.check_code.check_foreign import check_foreign
 from strapgen.firmware.check_code.foreign import Convention, ForeignStep
-from strapgen.firmware.check_code.foreign_arguments import ForeignSource, read_arguments
 from strapgen.firmware.check_code.ladder import closed_form_deg_h, cone
 from strapgen.firmware.check_code.rotation import FIRST_ORDER
 from strapgen.ir.exceptions import InputError
@@ -139,8 +139,8 @@ PLAIN = Convention()
 
 
 def example(name: str) -> ForeignStep:
-    arguments = read_arguments("state[4], increments[3] -> state[4]")
-    source = ForeignSource(EXAMPLES / name, "integrator_update", arguments, "integrator_init")
+    arguments = "state[4], increments[3] -> state[4]"
+    source = read_source(EXAMPLES / name, "integrator_update", arguments, "integrator_init")
     return ForeignStep(source, Convention("first"))
 
 
@@ -335,16 +335,16 @@ void step(double q[4], const double d[3])
 
 
 def test_conflicting_options_are_refused(tmp_path):
-    (tmp_path / "a.c").write_text("")
-    source = ForeignSource(tmp_path / "a.c", "f", read_arguments("state[4], rates[3] -> next[4]"))
+    (tmp_path / "a.c").write_text(
+        "void f(const double q[4], const double g[3], double n[4]) { n[0] = q[0] + g[0]; }"
+    )
+    source = read_source(tmp_path / "a.c", "f", "state[4], rates[3] -> next[4]")
     with pytest.raises(
         InputError,
-        match="--input increments contradicts the argument rates; --input rates or rates-at-ends fits it",
+        match="--input increments contradicts the argument rates; --input rates or instants fits it",
     ):
         ForeignStep(source)
-    with pytest.raises(
-        InputError, match="input 'angles' is not known; allowed: increments, rates, rates-at-ends"
-    ):
+    with pytest.raises(InputError, match="input 'angles' is not known; allowed: increments, rates, instants"):
         ForeignStep(source, takes="angles")
     with pytest.raises(InputError, match="scalar 'middle' is not known; allowed: last, first"):
         Convention("middle")
@@ -449,7 +449,7 @@ def test_generated_steps_hold(tmp_path, algorithm, method, samples):
         (tmp_path / name).write_text(text)
     (file,) = tmp_path.glob("*.c")
     elements = 4 if algorithm == "euler" else 9
-    arguments = read_arguments(f"state[{elements}], increments[{3 * samples}] -> next[{elements}]")
-    outcome = check_foreign(ForeignStep(ForeignSource(file, sources.function.name, arguments)))
+    arguments = f"state[{elements}], increments[{3 * samples}] -> next[{elements}]"
+    outcome = check_foreign(ForeignStep(read_source(file, sources.function.name, arguments)))
     assert (outcome.holds, outcome.cause) == (True, None)
     assert outcome.order > 3.9

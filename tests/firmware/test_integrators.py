@@ -9,8 +9,8 @@ import pytest
 
 from strapgen.firmware.check_code import coning_causes as causes
 from strapgen.firmware.check_code import ladder
+from strapgen.firmware.check_code.bridge import read_source
 from strapgen.firmware.check_code.foreign import ENDS, Convention, ForeignStep
-from strapgen.firmware.check_code.foreign_arguments import ForeignSource, read_arguments
 from strapgen.firmware.check_code.ladder import cone
 from strapgen.firmware.check_code.rotation import FIRST_ORDER
 
@@ -461,7 +461,7 @@ def instants(outcome, vector: str, takes: str, samples: int = 1):
 def test_rates_at_instants_are_told_from_means(outcome, samples):
     as_means = instants(outcome, TRAPEZOID, "rates", samples)
     words = "rates at instants are taken for means: its rates are those at the ends of the intervals"
-    assert as_means.cause == f"{words}; --input rates-at-ends fits, order 2.00"
+    assert as_means.cause == f"{words}; --input instants fits, order 2.00"
     assert "delay" in failed(as_means)
     as_instants = instants(outcome, TRAPEZOID, ENDS, samples)
     delay = next(finding for finding in as_instants.findings if finding.name == "delay")
@@ -653,8 +653,8 @@ def test_the_verdict_rests_on_the_coefficient_in_either_precision(outcome, coeff
 @pytest.mark.parametrize("samples", [1, 2])
 def test_rates_at_ends_are_those_at_the_ends_of_the_intervals(tmp_path, samples):
     (tmp_path / "a.c").write_text("void step(const double r[][3], double n[4]) { n[0] = r[0][0]; }")
-    arguments = read_arguments(f"rates[{samples}][3] -> next[4]")
-    step = ForeignStep(ForeignSource(tmp_path / "a.c", "step", arguments), takes=ENDS)
+    arguments = f"rates[{samples}][3] -> next[4]"
+    step = ForeignStep(read_source(tmp_path / "a.c", "step", arguments), takes=ENDS)
     segment = ladder.drift_segments(step)[0]
     # The rate in body axes turns about y, on the cone of 1 deg at 10 Hz, 0.01 s from instant to instant; the run
     # begins at time 0, and its first interval ends at the first instant.

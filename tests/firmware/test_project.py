@@ -17,7 +17,6 @@ from strapgen.firmware.vectors import vectors_of_choice
 from strapgen.firmware.vectors_c import file_names, table_files
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.fixed_settings import Settings
-from strapgen.navigation.two_speed import two_speed_sources
 
 SETTINGS = Settings.of(word=32, max_rate_deg_s=400, step="0.01", increments=2, carry="full")
 #: Kernels, targets and settings, with the largest error in deg that the run may print; None for a single call.
@@ -39,15 +38,12 @@ LOOPS = [
 
 @cache
 def files_of(kernel: str, target: str, settings: Settings | None) -> dict[str, str]:
-    choice = choose(kernel)
-    sources = pipeline.compile(choice, target, settings)
-    return {**sources.step_files, **project.project_files(choice, target, settings)}
+    return project.project_files(choose(kernel), target, settings)
 
 
 @cache
 def loop_files(algorithm: str, target: str, settings: Settings | None) -> dict[str, str]:
-    whole = two_speed_sources.sources(algorithm, 2, target, settings)
-    return {**whole.step_files, **two_speed_project.project_files(algorithm, 2, target, settings)}
+    return two_speed_project.project_files(algorithm, 2, target, settings)
 
 
 def code(files: dict[str, str], *parts: str) -> list[str]:
@@ -143,7 +139,7 @@ def test_user_changes_are_not_overwritten(tmp_path):
     files = files_of(*PROJECTS[0][:3])
     written(tmp_path, files)
     project.refuse_changed(tmp_path, files)  # the same files once more
-    for name in project.YOURS:
+    for name in filter(project.is_yours, files):
         changed = tmp_path / name
         changed.write_text("mine")
         with pytest.raises(InputError, match=f"{name} exists and differs from what --project writes"):

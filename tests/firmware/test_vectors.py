@@ -278,6 +278,9 @@ def test_the_command_of_a_loop_writes_the_vectors_of_its_project(tmp_path, capsy
         ("vectors euler-product --max-angle-rad 0.1", "takes no increments"),
         ("generate euler --project", "--project goes with targets in C, not with numpy"),
         ("generate --all --project", "--project does not go with it"),
+        ("generate euler --target c --project sled", "project 'sled' is not known; allowed: cmake"),
+        ("generate --project=make euler --target c", "project 'make' is not known"),
+        ("two-speed dcm --project make", "project 'make' is not known"),
     ],
 )
 def test_conflicting_options_are_refused_in_one_line(command, message, tmp_path, monkeypatch, capsys):
@@ -285,6 +288,16 @@ def test_conflicting_options_are_refused_in_one_line(command, message, tmp_path,
     error = command_says(command, capsys, 2)
     assert message in error and error.count("\n") == 1
     assert list(tmp_path.iterdir()) == []
+
+
+def test_the_kind_of_a_project_may_be_left_out(tmp_path, capsys):
+    """A word behind --project that names no kind is the argument of the command, where none has come before."""
+    for number, words in enumerate(
+        ["euler-product --project", "euler-product --project cmake", "--project euler-product"]
+    ):
+        command_says(f"generate {words} --target c --out {tmp_path / str(number)}", capsys)
+        names = sorted(path.name for path in (tmp_path / str(number)).iterdir())
+        assert "CMakeLists.txt" in names and "euler_product.c" in names
 
 
 @pytest.mark.long

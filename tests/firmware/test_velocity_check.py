@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import json
+import shlex
 
 import numpy as np
 import pytest
 
+from strapgen.cli import main
 from strapgen.firmware.check_code import coning_causes as causes
 from strapgen.firmware.check_code import velocity_findings as said
 
@@ -343,3 +345,51 @@ def test_samples_that_are_turned_one_by_one(outcome, at, cause):
     assert {"coefficients", "sculling"} <= {*failed(checked)}
     words = [causes.ABSENT, *([cause] if cause else []), f"sculling {causes.ABSENT}"]
     assert checked.cause == "; ".join(words)
+
+
+WRONG = """
+void turn(const double d[3], double rotation[3]) { for (int i = 0; i < 3; i++) rotation[i] = d[i]; }
+void push(double q[4], const double d[3], const double s[3], double v[3]) { q[3] = d[0]; v[0] += s[0]; }
+void free_fall(double q[4], const double d[3], double v[3]) { q[3] = d[0]; v[0] += 1; }
+void change(const double d[2][3], const double s[3], double c[3]) { c[0] = d[0][0] + s[0]; }
+"""
+PUSH = (
+    "--function push --arguments 'state[4], increments, velocity_increments, velocity -> state[4], velocity'"
+)
+TURN = "--function turn --arguments 'increments -> rotation'"
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        (f"{TURN} --frame-rate-rad-s 0,0,1e-5", "--frame-rate-rad-s goes with an attitude behind the arrow"),
+        (f"{TURN} --gravity-m-s2 0,0,9.8", "--gravity-m-s2 goes with a velocity behind the arrow"),
+        (f"{PUSH} --gravity-m-s2 9.8", "--gravity-m-s2 is '9.8'; three numbers"),
+        (f"{PUSH} --frame-rate-rad-s 0,0,a", "--frame-rate-rad-s"),
+        (f"{PUSH} --input instants", "--input instants goes without a velocity"),
+        (PUSH.replace(" velocity_increments,", " zeros,"), "need each other"),
+        (PUSH.replace("velocity -> state[4], velocity", "zeros -> state[4]"), "need each other"),
+        (PUSH.replace(", velocity'", ", velocity, velocity'"), "twice behind the arrow"),
+        (PUSH.replace("velocity -> state[4], velocity", "velocity -> velocity"), "need"),
+        (PUSH.replace("> state[4], velocity", "> state[4], position"), "position needs a velocity"),
+        (
+            PUSH.replace("> state[4], velocity", "> state[4], speed = velocity"),
+            "names no result; allowed: velocity",
+        ),
+        (
+            "--function free_fall --arguments 'state, increments, gravity -> state'",
+            "gravity needs a velocity",
+        ),
+        (
+            "--function change --arguments 'increments[2][3], forces -> velocity_change'",
+            "forces has 3 numbers, increments 6; they must agree",
+        ),
+    ],
+)
+def test_what_cannot_be_judged_gets_one_line_and_status_2(tmp_path, capsys, words, says):
+    (tmp_path / "a.c").write_text(WRONG)
+    with pytest.raises(SystemExit) as stop:
+        main(["check", f"{tmp_path}/a.c", *shlex.split(words)])
+    said = capsys.readouterr()
+    assert (stop.value.code, said.out) == (2, "")
+    assert said.err.count("\n") == 1 and says in said.err

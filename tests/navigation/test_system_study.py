@@ -11,67 +11,58 @@ from commands import run
 from strapgen.analysis.vibration.spectrum import read_spectrum
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.fixed_settings import Settings
+from strapgen.lab.motions.motions import motion
 from strapgen.navigation.systems import system_study
 from strapgen.navigation.systems.fitting import fitted
 from strapgen.navigation.systems.system_bounds import bounds
 from strapgen.navigation.systems.system_comparison import agreement
 from strapgen.navigation.systems.system_file import parsed
+from strapgen.navigation.systems.system_flight import begun
 from strapgen.navigation.systems.system_runner import system_runner
-from strapgen.navigation.systems.system_runs import begun
-from strapgen.navigation.systems.turning_vehicle import TurningVehicle
+from strapgen.navigation.systems.system_runs import cycles_of, samples
 from strapgen.navigation.systems.wiring import described, wired
+from strapgen.navigation.vehicle.vehicle_motions import shaken as shaken_by
+from strapgen.navigation.vehicle.vehicle_motions import vibration
 
 EXAMPLE = "examples/strapdown.toml"
 #: One count of the gyros in rad.
 COUNT = 3 * math.pi / 648000
 
 
+def sensed(description, vehicle, seconds):
+    """Samples of a system on a vehicle."""
+    cycles = cycles_of(description.system, Fraction(seconds))
+    return samples(description, *vehicle.both_samples(1 / description.system.sample_hz, 0, cycles))
+
+
 @pytest.fixture(scope="module")
 def shaken():
-    return TurningVehicle(math.radians(45), math.radians(70), read_spectrum("examples/vibration.csv"))
-
-
-def test_rates_and_attitudes_of_the_vehicle_belong_together(shaken):
-    h, times = 1e-5, np.linspace(0.3, 50, 40)
-    before, attitude, after = (shaken.attitude(times + dt) for dt in (-h, 0, h))
-    skew = attitude.swapaxes(-1, -2) @ (after - before) / (2 * h)
-    rate = np.stack([skew[:, 2, 1], skew[:, 0, 2], skew[:, 1, 0]], axis=1)
-    sensed, force = shaken.measured(times)
-    # A central difference errs by h^2/6 times the third derivative, at 200 Hz at most 1e-3 rad of 1e9 1/s^3.
-    assert np.allclose(rate + shaken.earth_rate @ attitude, sensed, atol=1e-4)
-    calm = TurningVehicle(math.radians(45), math.radians(70)).measured(times)[1]
-    assert np.allclose(np.linalg.norm(calm, axis=1), shaken.gravity, rtol=1e-12)
-    assert np.abs(force - calm).max() > 1
+    return shaken_by(motion("swinging"), vibration(read_spectrum("examples/vibration.csv")))
 
 
 def test_increments_repeat_with_the_motion(shaken):
-    for increments in TurningVehicle(math.radians(45), math.radians(70)).increments(0.1, 1300):
+    for increments in motion("swinging").both_samples(Fraction(1, 10), 0, 1300):
         assert (increments[1200:] == increments[:100]).all()
     first, again = np.array([0.25, 0.5]), np.array([120.25, 120.5])
-    assert np.allclose(shaken.attitude(again), shaken.attitude(first), atol=1e-9)
+    assert np.allclose(shaken.navigation_attitude(again), shaken.navigation_attitude(first), atol=1e-9)
     # Phases of up to 461 Hz are 3.5e5 rad after two minutes, and rounded to 8e-11; accelerations add up to less than
     # 1000 m/s^2.
-    for one, other in zip(shaken.measured(again), shaken.measured(first), strict=True):
+    for name in ("rate", "force"):
+        one, other = (getattr(shaken.sensed(times), name) for times in (again, first))
         assert np.allclose(one, other, rtol=0, atol=1e-7)
-
-
-def test_increments_are_those_of_half_the_cycle_added(shaken):
-    for whole, halves in zip(shaken.increments(0.01, 50), shaken.increments(0.005, 100), strict=True):
-        assert np.allclose(whole, halves.reshape(-1, 2, 3).sum(axis=1), rtol=0, atol=1e-12)
 
 
 @pytest.mark.long
 def test_the_chain_finds_the_attitude_of_a_vehicle_that_turns():
-    vehicle = TurningVehicle(math.radians(45), math.radians(70))
     description = described(EXAMPLE)
-    result = system_study.study(description, vehicle, Fraction(4), ["c-fixed32", "c-fixed16"])
+    result = system_study.study(description, motion("swinging"), Fraction(4), ["c-fixed32", "c-fixed16"])
     # Half a count on each axis, and what compensation leaves to second order, 1e-6 of the angles.
-    assert result.against_truth.max() < 2 * COUNT
-    fine, coarse = result.errors
-    assert fine.attitude.max() < 1e-8 * 16  # units of 2^-30 over 200 passes, with error feedback
-    assert 1e-6 < coarse.attitude.max() < 2e-3
-    assert fine.velocity.max() < 1e-5
-    assert fine.position.max() < 0.1
+    assert result.double.sizes[0].max() < 2 * COUNT
+    fine, coarse = (flight.sizes for flight in result.differences.values())
+    assert fine[0].max() < 1e-8 * 16  # units of 2^-30 over 200 passes, with error feedback
+    assert 1e-6 < coarse[0].max() < 2e-3
+    assert fine[1].max() < 1e-5
+    assert fine[2].max() < 0.1
 
 
 @pytest.mark.long
@@ -87,9 +78,9 @@ def test_the_chain_finds_the_attitude_of_a_vehicle_that_turns():
 )
 def test_every_pass_of_the_chain_is_within_the_sum_of_the_bounds(shaken, rate, seconds, backend, reference):
     description = described(EXAMPLE, Fraction(rate))
-    inputs = system_study.samples(description, shaken, Fraction(seconds))
+    inputs = sensed(description, shaken, seconds)
     runner = system_runner(description, backend)
-    start, _ = begun(runner, shaken.attitude(np.zeros(1))[0])
+    start = begun(runner, shaken)
     result = agreement(runner, system_runner(description, reference), inputs, start)
     assert result.holds, {name: share for name, share in result.share.items() if share > 1}
     assert set(result.reasons) == {"angles_previous", "geographic_previous"}  # angles jump by a turn
@@ -100,7 +91,7 @@ def test_every_pass_of_the_chain_is_within_the_sum_of_the_bounds(shaken, rate, s
 @pytest.mark.long
 def test_the_model_and_the_c_have_the_same_bits_along_the_chain(shaken):
     description = described(EXAMPLE, Fraction(100))
-    inputs = system_study.samples(description, shaken, Fraction(5))
+    inputs = sensed(description, shaken, 5)
     from strapgen.ir.fixed_settings import Settings
 
     for word in (16, 32):
@@ -117,7 +108,7 @@ def test_the_command_prints_differences(capsys):
         run(["study", "system", EXAMPLE, "--sample-hz", "100", "--duration", "2", *options])
         return capsys.readouterr().out
 
-    assert "attitude in double" in printed("--backend", "c-fixed16")
+    assert "algorithm, in double" in printed("--backend", "c-fixed16")
     data = json.loads(printed("--backend", "c-fixed32", "--format", "json"))
     assert data["sample_hz"] == 100
     assert data["from_double"][0]["backend"] == "c-fixed32"
@@ -143,9 +134,7 @@ def test_inputs_that_no_vehicle_measures_are_refused(shaken):
     description = described(EXAMPLE, Fraction(100))
     choices = {**description.choices, "gyro": description.choices["cosines"]}
     with pytest.raises(InputError, match=r"gyro_counts \(unit 1, frame b\) is no gyro or accelerometer"):
-        system_study.samples(
-            type(description)(**{**vars(description), "choices": choices}), shaken, Fraction(1)
-        )
+        sensed(type(description)(**{**vars(description), "choices": choices}), shaken, 1)
 
 
 #: Three rates, a delayed wire, sums, a state in another stage's cell, and words of two lengths.

@@ -56,6 +56,7 @@ COMMANDS = {
     "compare two-speed-euler --backend c,c-fixed16 --motion constant --set y_deg_s=10 --duration 0.1": (
         "system-comparison"
     ),
+    "simulate examples/strapdown.toml --motion polar --step 0.01 --duration 1": "flight",
     "study system examples/strapdown.toml --sample-hz 100 --duration 1 --backend c-float": "system-study",
     "strapdown euler --recording examples/inertial_log.csv --fast-cycles 4 --slow-cycles 50": "course",
     "redundancy examples/hexad.toml --out OUT": "redundant-sensors",

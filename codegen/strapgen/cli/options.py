@@ -80,7 +80,12 @@ RunAlgorithm = Annotated[
     str, _argument("dcm, euler or cayley-klein, a Python file of your own, or a described system.", _STEPS)
 ]
 CheckedAlgorithm = Annotated[
-    str, _argument("dcm, euler or cayley-klein, or a Python file of your own, or one in C or C++.", _STEPS)
+    str,
+    _argument(
+        "dcm, euler or cayley-klein, or a Python file of your own, one in C, C++ or MATLAB, "
+        "or package.module:function.",
+        _STEPS,
+    ),
 ]
 OptionalStepAlgorithm = Annotated[
     _Text, _argument("dcm, euler or cayley-klein, or a Python file of your own.", _STEPS)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
-from strapgen.cli import terminal
+from strapgen.cli import project_kinds, terminal
 from strapgen.cli.options import option
 from strapgen.ir import checks
 from strapgen.ir.checks import alternatives
@@ -59,13 +59,17 @@ WithRuns = Annotated[
         panel="Output",
     ),
 ]
-#: Files that build and test the C.
+#: The kind of a project that builds and tests the C.
 Project = Annotated[
-    bool,
+    str | None,
     option(
         "--project",
-        help="In C: write what builds and tests it too: CMakeLists.txt, main.c and a test of vectors.",
+        metavar="KIND",
+        help="In C: write a project of this kind that builds and tests it: cmake.  "
+        f"[without a value: {project_kinds.DEFAULT}]",
         panel="Output",
+        read=project_kinds.read_kind,
+        words="strapgen.cli.project_kinds:titles",
     ),
 ]
 

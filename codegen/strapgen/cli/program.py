@@ -13,12 +13,15 @@ import typer
 from typer.core import TyperCommand, TyperGroup
 
 from strapgen import registration
-from strapgen.cli import completion, help_layout, terminal
+from strapgen.cli import completion, help_layout, project_kinds, terminal
 from strapgen.cli.help_layout import CommandHelp, lay_out, summary
 from strapgen.cli.option_groups import CommandOptions, read_words
 from strapgen.ir.checks import alternatives, suggestions
 from strapgen.ir.exceptions import InputError, StrapgenError
 from strapgen.registration import Command
+
+#: Options whose value may be left out: the value that they then have, and a function that returns those they take.
+DEFAULTS = {"--project": (project_kinds.DEFAULT, project_kinds.titles)}
 
 
 class PlainCommand(TyperCommand):
@@ -31,6 +34,7 @@ class PlainCommand(TyperCommand):
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """Read the command line; an option's name is not the value of the option before it."""
         read_words(self, ctx)
+        args = _with_defaults(self, ctx, args)
         if not ctx.resilient_parsing:  # else a shell completes the line
             _refuse_missing_values(self, ctx, args)
             _refuse_second_values(self, ctx, args)
@@ -154,6 +158,31 @@ def _options_of(command: Any, context: Any) -> list[Any]:
 def _shown_options(command: Any, context: Any) -> list[Any]:
     """Return the options without old ones, which no help and no suggestion names."""
     return [p for p in _options_of(command, context) if not getattr(p, "hidden", False)]
+
+
+def _with_defaults(command: Any, context: Any, words: Sequence[str]) -> list[str]:
+    """Return a command line on which options whose value may be left out have one.
+
+    The word behind such an option is its value, unless it is the first argument of the command and no value.
+    """
+    names = [option.opts[0] for option in _options_of(command, context)]
+    end = words.index("--") if "--" in words else len(words)
+    read = list(words)
+    for place in reversed(range(end)):
+        if read[place] not in DEFAULTS or read[place] not in names:
+            continue
+        default, kinds = DEFAULTS[read[place]]
+        following = read[place + 1 : place + 2]
+        if following and not following[0].startswith("-"):
+            stated = [*read[:place], f"{read[place]}={following[0]}", *read[place + 2 :]]
+            given = command.make_parser(context).parse_args(list(stated))[0]
+            if following[0] in kinds() or any(
+                isinstance(given.get(one.name), str) for one in _arguments(command, context)
+            ):
+                read = stated
+                continue
+        read[place] = f"{read[place]}={default}"
+    return read
 
 
 def _refuse_missing_values(command: Any, context: Any, words: Sequence[str]) -> None:

@@ -32,6 +32,7 @@ REGISTRATION = Registration(
     },
     extensions={
         "generate.project": f"{__package__}:project",
+        "project.kinds": f"{__package__}.project_kinds:KINDS",
         "lab.source-files": f"{__package__}:header_command",
         "navigation.source-files": f"{__package__}.header_command:runner_of_file",
         "two-speed.project": f"{__package__}:two_speed_project",

@@ -11,8 +11,10 @@ import numpy as np
 
 from strapgen import pipeline
 from strapgen.catalogue import Choice
+from strapgen.cli.project_kinds import DEFAULT, kinds
 from strapgen.firmware import project
-from strapgen.firmware.project import MotionRun, two_speed_main
+from strapgen.firmware.fmu import archive, units
+from strapgen.firmware.project import MotionRun, Project, two_speed_main
 from strapgen.firmware.project import refuse_changed as refuse_changed
 from strapgen.firmware.vectors import MODEL, SEED, ProgramEvaluator, vectors_of_choice
 from strapgen.firmware.vectors_c import CycleTable, cycle_files, table_files
@@ -36,17 +38,25 @@ _PARTS = (8, 32, 128, 512)
 
 
 def project_files(
-    algorithm: str, sculling: int = 2, target: str = "c", settings: Settings | None = None
-) -> dict[str, str]:
-    """Return the files that build and test an algorithm in two speeds, without those of the algorithm itself."""
+    algorithm: str,
+    sculling: int = 2,
+    target: str = "c",
+    settings: Settings | None = None,
+    *,
+    kind: str = DEFAULT,
+) -> Mapping[str, str | bytes]:
+    """Return the files of a project around the C of an algorithm in two speeds."""
+    command = project.with_kind(two_speed_sources.command(algorithm, sculling, target, settings), kind)
+    if kind in archive.VERSIONS:
+        unit = units.of_two_speeds(algorithm, sculling, target, settings, command)
+        return archive.project_files(unit, kind)
     whole = two_speed_sources.sources(algorithm, sculling, target, settings)
     loops = two_speed_sources.loops(algorithm, sculling, target, settings)
     system = two_speed_sources.description(algorithm, sculling).system
-    command = f"{two_speed_sources.command(algorithm, sculling, target, settings)} --project"
     tests = cycle_files(_cycle_table(whole, LoopSources(loops, system), command))
     for loop in loops:
         stated = None if loop.fixed is None else loop.fixed.settings
-        tests |= table_files(vectors_of_choice(Choice(loop.kernel), target, stated))
+        tests |= table_files(vectors_of_choice(Choice(loop.kernel), target, stated, kinds()[kind].vectors))
     conversions = [] if algorithm == "dcm" else [pipeline.compile(Choice(f"dcm-from-{algorithm}"), "c")]
     motion = project.motion_files(["coning-increments", "coning-truth"], conversions)
     step = _FAST_CYCLE * FAST
@@ -62,9 +72,8 @@ def project_files(
         FAST,
         SLOW,
     )
-    return project.assembled(
-        whole, command, two_speed_main(whole, loops, wiring(system, loops), command, run), motion, tests
-    )
+    main = two_speed_main(whole, loops, wiring(system, loops), command, run)
+    return Project(whole, command, main, tests, motion).files(kind)
 
 
 def _cycle_table(whole: Sources, parts: LoopSources, command: str) -> CycleTable:

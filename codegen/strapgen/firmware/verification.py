@@ -157,7 +157,7 @@ def _is_whole(header: Path) -> bool:
     if not header.is_file():
         return False
     command = command_of(text_of(header)) or ""
-    return command.startswith(_COMMANDS) and not command.endswith((" --with-runs", " --project"))
+    return command.startswith(_COMMANDS) and not re.search(" --(with-runs$|project)", command)
 
 
 def verify(

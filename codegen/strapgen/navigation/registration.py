@@ -48,7 +48,9 @@ REGISTRATION = Registration(
         "stress": Command(f"{__package__}.study_commands:rate_table", hidden=True),
     },
     kernels=(f"{__package__}.navigation_kernels:KERNELS",),
+    motions=(f"{__package__}.vehicle.vehicle_motion_names:TABLE",),
     files={
+        "motion": f"{__package__}.vehicle.course_file:COURSE",
         "system": f"{__package__}.systems.system_file:SYSTEM",
         "loops": f"{__package__}.loops.loop_schedule:SCHEDULE",
         "layout": f"{__package__}.instruments.layout:LAYOUT",
@@ -59,6 +61,7 @@ REGISTRATION = Registration(
         "preintegration": f"{__package__}.preintegration.preintegration_sources:PreintegrationResult",
         "two-speed": f"{__package__}.two_speed.two_speed_command:TwoSpeedResult",
         "system": f"{__package__}.systems.system_report:SystemResult",
+        "flight": f"{__package__}.systems.system_flight:FlightResult",
         "system-outputs": f"{__package__}.systems.system_runs:SystemCourseResult",
         "system-comparison": f"{__package__}.systems.system_comparison:SystemComparisonResult",
         "system-study": f"{__package__}.systems.system_study:SystemStudyResult",
@@ -75,6 +78,7 @@ REGISTRATION = Registration(
     },
     lists={"systems": f"{__package__}.systems.built_in:names"},
     extensions={
+        "lab.motion-files": f"{__package__}.vehicle.vehicle_motion_names:FILES",
         "lab.described": f"{__package__}.systems.system_simulation:SYSTEMS",
         "design.two-speed": f"{__package__}.two_speed.two_speed_selection:TwoSpeedLoops",
     },

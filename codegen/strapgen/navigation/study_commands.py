@@ -12,16 +12,24 @@ from typing import Annotated, Any, ClassVar
 import typer
 
 from strapgen.cli.fixed_options import FixedOptions
-from strapgen.cli.option_groups import Shown, grouped
+from strapgen.cli.option_groups import Needs, Shown, grouped, rules
 from strapgen.cli.options import Duration, FastBackends, Processor, a_backend, option
 from strapgen.cli.output import Output
 from strapgen.cli.progress import track
 from strapgen.cli.values import NotNegative, Number, Positive, Vector, filled, names, whole
 from strapgen.ir.exceptions import InputError
-from strapgen.lab.run_options import MOTION_SETTINGS, in_words, motion_option
+from strapgen.lab.run_options import (
+    MOTION_SETTINGS,
+    MotionSettings,
+    SensorFile,
+    in_words,
+    motion_option,
+    read_errors,
+)
 
 
 @grouped
+@rules(Needs("--aligned", "--errors"))
 def study_system(
     file: Annotated[Path, typer.Argument(metavar="FILE", help="TOML file that describes the system.")],
     *,
@@ -45,13 +53,21 @@ def study_system(
         ),
     ] = None,
     duration: Duration = Positive("60"),
+    motion: Annotated[str, motion_option("swinging")] = "swinging",
+    settings: MotionSettings = None,
     turn_rate_deg_s: Annotated[
-        Positive,
-        option("--turn-rate-deg-s", metavar="RATE", help="Largest rate of heading in deg/s.", panel="Input"),
-    ] = Positive("70"),
+        Positive | None,
+        option(
+            "--turn-rate-deg-s",
+            metavar="RATE",
+            help="Largest rate of heading in deg/s of the motion swinging; --set turn_rate_deg_s.",
+            panel="Input",
+        ),
+    ] = None,
     latitude_deg: Annotated[
-        Number, option("--latitude-deg", metavar="DEG", help="Latitude of the vehicle in deg.", panel="Input")
-    ] = Number("45"),
+        Number | None,
+        option("--latitude-deg", metavar="DEG", help="Latitude in deg; --set latitude_deg.", panel="Input"),
+    ] = None,
     spectrum: Annotated[
         Path | None,
         option(
@@ -61,31 +77,48 @@ def study_system(
             panel="Input",
         ),
     ] = None,
+    errors: SensorFile = None,
+    aligned: Annotated[
+        bool,
+        option(
+            "--aligned",
+            help="With --errors: begin with the vertical that the sensors measure, as after an alignment at rest.",
+            panel="Input",
+        ),
+    ] = False,
     cpu: Processor = None,
     fixed: Annotated[FixedOptions, Shown(only=("rounding", "carry", "allowance"))],
     output: Output,
 ) -> None:
     """Run a described system on several back ends, and compare attitude, velocity and position.
 
-    A vehicle stands on one spot, turns to and fro, rolls, pitches and vibrates; its sensors send counts. You see the
-    differences of the other back ends from C in double, the errors of C in double, and memory and load of all, beside
-    those of 1984. Differences add up in a closed run, and no bound is known for them; strapgen compare holds each
-    single pass to its bound.
+    A vehicle moves over the earth, or stands on one spot, turns to and fro, rolls and pitches; it may vibrate. You see
+    the errors of attitude, velocity and position by cause: those of the algorithm in double, what the word lengths of
+    other back ends and the errors of the sensors add; and memory and load of all, beside those of 1984. Differences add
+    up in a closed run, and no bound is known for them; strapgen compare holds each single pass to its bound.
 
     Example: strapgen study system examples/strapdown.toml --sample-hz 100 --duration 60
-    """
-    output.check(file, spectrum)
-    import math
 
+    Example: strapgen study system examples/strapdown.toml --sample-hz 100 --motion polar --duration 300
+    """
+    output.check(file, spectrum, errors)
     from strapgen.analysis.vibration.spectrum import read_spectrum
     from strapgen.navigation.systems.system_study import SystemStudyResult, study
-    from strapgen.navigation.systems.turning_vehicle import TurningVehicle
     from strapgen.navigation.systems.wiring import described
+    from strapgen.navigation.vehicle.vehicle_motions import named, shaken, vibration
 
-    turning, latitude = math.radians(turn_rate_deg_s), math.radians(latitude_deg)
-    vehicle = TurningVehicle(latitude, turning, None if spectrum is None else read_spectrum(spectrum))
-    result = study(described(file, sample_hz), vehicle, duration, backend, fixed.settings(1), cpu or "")
-    output.show(SystemStudyResult.of(result))
+    stated = {"turn_rate_deg_s": turn_rate_deg_s, "latitude_deg": latitude_deg}
+    values = {**(settings or {}), **{key: str(value) for key, value in stated.items() if value is not None}}
+    flown = named(motion, values)
+    if spectrum is not None:
+        flown = shaken(flown, vibration(read_spectrum(spectrum)))
+    system = described(file, sample_hz)
+    result = study(
+        system, flown, duration, backend, fixed.settings(1), cpu or "", read_errors(errors), aligned
+    )
+    output.show(
+        SystemStudyResult.of(result, (in_words(values) and f"{motion} ({in_words(values)})") or motion)
+    )
 
 
 @grouped

@@ -346,6 +346,16 @@ def compile_module(
     return _compile(command, files, of.ending, draft / _library(name), ffi)
 
 
+def shared_library(name: str, files: Mapping[str, str]) -> bytes:
+    """Return a shared library for this machine of files in C, which shows the symbols that they export."""
+    with tempfile.TemporaryDirectory() as folder:
+        library = Path(folder, f"{name}.so")
+        reasons = _compile([*C.command(), *C.flags_in_effect(), "-shared"], files, C.ending, library)
+        if reasons:
+            raise CompilerError(f"{C.path()} failed on {name}: {reasons[0]}")
+        return library.read_bytes()
+
+
 def _linking() -> list[str]:
     """Return the options, after all files, that make a module for Python of what a compiler is given."""
     if not _ON_WINDOWS:
@@ -370,6 +380,8 @@ def _compile(
         if wrapper is not None:
             wrapper.emit_c_code(str(Path(folder, f"{name}_wrapper.c")))
             words += ["-x", "c", f"{name}_wrapper.c", "-x", "none", *_linking()]
+        elif ending == C.ending:
+            words.append("-lm")
         how: dict[str, Any] = {"capture_output": True, "text": True, "errors": "replace", "check": False}
         try:
             done = subprocess.run(words, cwd=folder, env=os.environ | {"LC_ALL": "C"}, **how)

@@ -170,11 +170,15 @@ def command_of(text: str) -> str | None:
     return " ".join(re.sub(r"\n(?: \*|%)", " ", stated[1]).split()) if stated else None
 
 
-def difference(folder: Path, files: Mapping[str, str]) -> str:
+def difference(folder: Path, files: Mapping[str, str | bytes]) -> str:
     """Return a unified diff from the files in a folder to generated ones by path; "" if they are the same."""
     lines: list[str] = []
     for name, text in files.items():
         path = folder / name
+        if isinstance(text, bytes):
+            if not path.is_file() or path.read_bytes() != text:
+                lines.append(f"Binary files {path} and {name} differ\n")
+            continue
         present = text_of(path) if path.is_file() else ""
         lines += unified(present, text, str(path) if path.is_file() else "/dev/null", name)
     return "".join(lines)

@@ -201,7 +201,7 @@ def _words(
             continue  # the back end has its word
         if key == "word" and isinstance(value, list | tuple):
             value = value[0]
-        if key == "project" and value and not _is_compiled(_target(variant, arguments)):
+        if key == "project" and not (value and _is_compiled(_target(variant, arguments))):
             continue
         if value is not None:
             yield name, _word(option, value, variant.folder)
@@ -313,6 +313,8 @@ _TAKES: dict[Any, tuple[tuple[type, ...], str]] = {
 
 def _read(option: Option, where: str, value: Any) -> None:
     """Check a value by the reader of its option."""
+    if isinstance(value, bool) and option.spelling in program.DEFAULTS:
+        return
     kinds, words = _TAKES.get(option.kind, ((str, *_NUMBER), "a number or a text"))
     is_right = isinstance(value, kinds) and (isinstance(value, bool) == (option.kind is bool))
     inner = value if isinstance(value, list) else [*value.values()] if isinstance(value, dict) else []
@@ -327,7 +329,7 @@ def _read(option: Option, where: str, value: Any) -> None:
 def _word(option: Option, value: Any, folder: Path) -> Any:
     """Return a value as the command line has it; a path is relative to the folder of the file."""
     if isinstance(value, bool):
-        return value
+        return program.DEFAULTS[option.spelling][0] if option.spelling in program.DEFAULTS else value
     if isinstance(value, dict):
         return [f"{key}={one}" for key, one in value.items()]
     if option.kind is Path:
@@ -381,6 +383,8 @@ def _key_schema(key: str, option: Option) -> dict[str, Any]:
     one, *more = kinds.get(option.kind, [{"type": "number"}, {"type": "string"}])
     if key in _SEVERAL:
         more = [{"type": "array", "minItems": 1, "items": one}]
+    if option.spelling in program.DEFAULTS:
+        more = [{"type": "boolean"}]
     return about | (one if not more else {"anyOf": [one, *more]})
 
 

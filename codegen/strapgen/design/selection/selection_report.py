@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, ClassVar
 
-from strapgen import pipeline, registration
+from strapgen import registration
 from strapgen.catalogue.methods.shaped_coning import ShapedConing
 from strapgen.catalogue.methods.window import Window
 from strapgen.design import coning_design, family
@@ -170,14 +170,14 @@ def firmware_files(
     if not isinstance(algorithm, AttitudeStep):
         described: Any = algorithm  # the loops of two speeds, the code of a described system
         options = f"--target c-fixed --word {brief.processor.word}"
-        files = dict(described.sources(f"strapgen system {SYSTEM} {options}").step_files)
-        return files | {SYSTEM: described.file(), REPORT: report}
+        code = described.sources(f"strapgen system {SYSTEM} {options}").step_files
+        return {**code, SYSTEM: described.file(), REPORT: report}
     choice = algorithm.choice
     settings = causes.settings(choice, brief, judgement.carry)
     if judgement.method.startswith(TUNED) and isinstance(choice.method, ShapedConing | Window):
         choice = replace(choice, method=replace(choice.method, file=COEFFICIENTS))
-    files = dict(pipeline.compile(choice, "c-fixed", settings).step_files)
-    files |= registration.extension("generate.project", "--out").project_files(choice, "c-fixed", settings)
+    writer = registration.extension("generate.project", "--out")
+    files: dict[str, str] = writer.project_files(choice, "c-fixed", settings)
     if judgement.method.startswith(TUNED) and isinstance(choice.method, ShapedConing):
         files[COEFFICIENTS] = coning_design.written(choice.method, command)
     if is_tuned_window(judgement.method):

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, ClassVar
 
@@ -14,11 +15,14 @@ from strapgen.cli.option_groups import Shown, grouped, stated
 from strapgen.cli.options import STEP_OPTIONS, CheckedAlgorithm, MethodOptions, option
 from strapgen.cli.output import TEXT_OUTPUT, Output
 from strapgen.cli.values import Positive, Vector
+from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError
 
 if TYPE_CHECKING:
+    from strapgen.firmware.check_code.bridge import ForeignSource
     from strapgen.firmware.check_code.conformance import Finding
     from strapgen.firmware.check_code.foreign import ForeignStep
+    from strapgen.firmware.check_code.interpreted import InterpretedSource
 
 _Text = str | None
 
@@ -37,8 +41,8 @@ class ForeignOptions:
         option(
             "--arguments",
             metavar="TEXT",
-            help="What it takes, in the order of C, and the attitude behind an arrow, for instance "
-            '"state[4], increments[2][3] -> next[4]" or "state[9], rates[3], dt -> state[9]".',
+            help="What it takes, in the order of C, and the attitude behind an arrow, where names do not say it, for "
+            'instance "state, increments[2][3] -> next" or "filter, rates, dt, =0 -> filter.q".',
         ),
     ] = None
     scalar: Annotated[
@@ -65,8 +69,8 @@ class ForeignOptions:
             "--input",
             metavar="NAME",
             help="What the samples are: increments in rad; rates in rad/s, means over the sampling interval; or "
-            "rates-at-ends in rad/s, those at the end of each interval.  [default: the name of the argument]",
-            words=("increments", "rates", "rates-at-ends"),
+            "instants in rad/s, the rates at the time of each sample.  [default: the name of the argument]",
+            words=("increments", "rates", "instants"),
         ),
     ] = None
     sample_hz: Annotated[
@@ -98,45 +102,145 @@ class ForeignOptions:
     ] = None
     init: Annotated[
         _Text,
-        option("--init", metavar="NAME", help="Name of the function that begins a run, if there is one."),
+        option(
+            "--init",
+            metavar="NAME",
+            help="The function or constructor that begins a run, if there is one; with arguments as "
+            '"begin(memory, 100)" or "Filter(0.01f)".',
+        ),
     ] = None
     precision: Annotated[
         _Text,
         option(
             "--precision",
             metavar="NAME",
-            help="Its numbers: float or double.  [default: double]",
+            help="What its numbers must be: float or double.  [default: those of the source]",
             words=("float", "double"),
         ),
     ] = None
+    angle_unit: Annotated[
+        _Text,
+        option(
+            "--angle-unit",
+            metavar="UNIT",
+            help="Unit of its angles and rates: rad, deg, or the rad of one count, as 2**-20.  [default: rad]",
+            words=("rad", "deg"),
+        ),
+    ] = None
+    state_bits: Annotated[
+        int | None,
+        option(
+            "--state-bits",
+            metavar="BITS",
+            help="Bits behind the point of an attitude in integers: 30 where 2**30 stands for 1.",
+        ),
+    ] = None
+    publishes: Annotated[
+        _Text,
+        option(
+            "--publishes",
+            metavar="N",
+            help="Calls to a result, or a number that changes with every result, as filter.count.  "
+            "[default: as its return value says, else 1]",
+        ),
+    ] = None
+    source: Annotated[
+        tuple[Path, ...] | None,
+        option("--source", metavar="FILE,...", help="Other files of its code, with commas between."),
+    ] = None
+    cflags: Annotated[
+        _Text,
+        option("--cflags", metavar="TEXT", help='Options of the compiler, as "-Iinclude -DFAST=1".'),
+    ] = None
+    compile_commands: Annotated[
+        _Text,
+        option(
+            "--compile-commands",
+            metavar="FILE",
+            help="A compile_commands.json, whose options for the file are taken.",
+        ),
+    ] = None
+    show_shim: Annotated[
+        bool | None,
+        option("--show-shim", help="Print the generated code that calls it, and check nothing."),
+    ] = None
+    keep_shim: Annotated[
+        _Text,
+        option("--keep-shim", metavar="FILE", help="Write the generated code that calls it to a file."),
+    ] = None
 
-    def step(self, file: str) -> ForeignStep:
-        """Return the function of a file, compiled."""
-        from strapgen.firmware.check_code.foreign import INTERVAL, Convention, ForeignStep
-        from strapgen.firmware.check_code.foreign_arguments import RATES, ForeignSource, read_arguments
+    def read(self, file: str) -> ForeignSource | InterpretedSource:
+        """Return the function of a file, and how it is called."""
+        from strapgen.firmware.check_code.bridge import read_source
+        from strapgen.firmware.check_code.interpreted import interpreted_source, is_callable
 
-        if self.function is None or self.arguments is None:
-            missing = "--function" if self.function is None else "--arguments"
-            raise InputError(
-                f'{file} needs {missing}; --function NAME --arguments "state[4], increments[2][3] -> next[4]" '
-                "is an example"
+        if is_callable(file):
+            return interpreted_source(
+                file, self.function, self.arguments, self.init or "", self.precision or "double"
             )
-        arguments = read_arguments(self.arguments)
-        if self.scalar is not None and arguments.elements != 4:
-            raise InputError(
-                f"--scalar {self.scalar} goes with a result of four elements; this one has {arguments.elements}"
-            )
-        convention = Convention(self.scalar or "last", self.sense or "body-to-reference")
-        takes = self.input or ("rates" if arguments.named(RATES) else "increments")
-        source = ForeignSource(
-            Path(file), self.function, arguments, self.init or "", self.precision or "double"
+        if self.function is None:
+            raise InputError(f"{file} needs --function; --function NAME says which one is checked")
+        return read_source(
+            *(file, self.function, self.arguments, self.init or "", self.precision),
+            takes=self.input or "",
+            is_angle_said=self.angle_unit is not None,
+            cflags=self.cflags or "",
+            compile_commands=self.compile_commands,
+            sources=self.source or (),
+            publishes=self.publishes or "",
         )
-        interval = INTERVAL if self.sample_hz is None else 1 / self.sample_hz
+
+    def step(self, source: ForeignSource | InterpretedSource) -> ForeignStep:
+        """Return a function, compiled."""
+        from strapgen.firmware.check_code.foreign import INTERVAL, Convention, ForeignStep
+        from strapgen.firmware.check_code.foreign_arguments import RATES
+
+        arguments, scalar = source.arguments, self.scalar
+        if scalar is not None and arguments.elements != 4:
+            raise InputError(
+                f"--scalar {scalar} goes with a result of four elements; this one has {arguments.elements}"
+            )
+        if scalar == "first" and arguments.names_scalar:
+            raise InputError(
+                f"--scalar {scalar} contradicts the source, whose names say which element is the scalar part"
+            )
+        convention = Convention(scalar or "last", self.sense or "body-to-reference")
         gravity, frame = (
             None if vector is None else tuple(map(float, vector))
             for vector in (self.gravity_m_s2, self.frame_rate_rad_s)
         )
-        return ForeignStep(source, convention, takes, interval, gravity, frame)
+        return ForeignStep(
+            source,
+            convention,
+            self.input or ("rates" if arguments.named(RATES) else "increments"),
+            INTERVAL if self.sample_hz is None else 1 / self.sample_hz,
+            gravity,
+            frame,
+            angle_unit=angle_unit(self.angle_unit or "rad"),
+            state_bits=checks.count("--state-bits", self.state_bits or 0, smallest=0, largest=62),
+        )
+
+
+def angle_unit(text: str) -> float:
+    """Return the rad of a unit of angles.
+
+    >>> angle_unit("rad"), angle_unit("2**-20") == 2.0**-20
+    (1.0, True)
+    """
+    if text in ("rad", "deg"):
+        return math.radians(1) if text == "deg" else 1.0
+    base, power, exponent = text.partition("**")
+    try:
+        value = checks.number("--angle-unit", base, positive=True)
+        value = value ** int(exponent) if power else value
+        size = float(value)
+    except (InputError, ValueError, OverflowError):
+        size = 0.0
+    if not 0 < size < math.inf:
+        raise InputError(
+            f"--angle-unit is {checks.shown(text)}; rad, deg, or the rad of a count as 2**-20 is needed"
+        )
+    return size
 
 
 @grouped
@@ -158,18 +262,20 @@ def check(
     Example: strapgen check examples/modified_rodrigues.py
 
     Example: strapgen check examples/check_foreign_c/correct.c --function integrator_update
-    --arguments "state[4], increments[3] -> state[4]" --scalar first --init integrator_init
+    --scalar first --init integrator_init
     """
-    output.check(algorithm, *method.files)
+    output.check(algorithm, *method.files, *(foreign.source or ()), foreign.compile_commands)
     from strapgen.firmware.check_code.foreign_arguments import FOREIGN_SUFFIXES, is_foreign
+    from strapgen.firmware.check_code.interpreted import is_callable
 
-    if is_foreign(algorithm):
-        _refuse(stated(method), f"goes with an algorithm of strapgen; {algorithm} is a file in C or C++")
+    if is_foreign(algorithm) or is_callable(algorithm):
+        _refuse(stated(method), f"goes with an algorithm of strapgen; {algorithm} is code of your own")
         _check_foreign(algorithm, foreign, output)
     else:
         _refuse(
             stated(foreign),
-            f"goes with a file in C or C++ ({', '.join(FOREIGN_SUFFIXES)}); {algorithm} is none",
+            f"goes with a file in C or C++ ({', '.join(FOREIGN_SUFFIXES)}), one in MATLAB or package.module:function; "
+            f"{algorithm} is none",
         )
         _check_step(algorithm, method, output)
 
@@ -203,10 +309,30 @@ def _check_step(algorithm: str, method: MethodOptions, output: Output) -> None:
 
 def _check_foreign(file: str, foreign: ForeignOptions, output: Output) -> None:
     """Check a function of a file in C or C++."""
-    step = foreign.step(file)
+    if foreign.input == "rates-at-ends":
+        terminal.remark("strapgen: --input rates-at-ends is now --input instants")
+        foreign = replace(foreign, input="instants")
+    source = foreign.read(file)
+    if foreign.show_shim or foreign.keep_shim:
+        from strapgen.firmware.check_code.bridge import ForeignSource, bridge_text
+        from strapgen.storage.files import write_files
+
+        if not isinstance(source, ForeignSource):
+            raise InputError(f"--show-shim and --keep-shim go with a file in C or C++; {file} is none")
+        if foreign.keep_shim:
+            read = [each.resolve() for each in (Path(file), *(foreign.source or ()))]
+            if Path(foreign.keep_shim).resolve() in read:
+                raise InputError(
+                    f"--keep-shim {foreign.keep_shim} is a file that the command reads; another one is needed"
+                )
+            for path in write_files(Path(), {foreign.keep_shim: bridge_text(source)}):
+                terminal.remark(f"wrote {path}")
+        if foreign.show_shim:
+            typer.echo(bridge_text(source))
+            return
     from strapgen.firmware.check_code.check_foreign import check_foreign
 
-    result = check_foreign(step)
+    result = check_foreign(foreign.step(source))
     output.show(result)
     _fail(file, result.findings, f"; likely cause: {result.cause}" if result.cause else "")
 

@@ -109,6 +109,8 @@ class ForeignResult(Result):
     coefficients: tuple[MeasuredCoefficient, ...] = ()
     #: What they correct of the drift on coning to leading order, 1 if they are right
     coefficient_ratio: float | None = None
+    #: What its parameters are taken for
+    reading: str = field(default="", metadata=INTERNAL)
     #: Of a function that computes a velocity
     translation: MeasuredTranslation | None = field(
         default=None, metadata=entry(spread=True, optional=True, kind=MeasuredTranslation)
@@ -125,7 +127,8 @@ class ForeignResult(Result):
 
     def text(self) -> str:
         """Return the findings, a line each, and the likely cause of a failure."""
-        lines = [f"{self.file}: {self.function}", "", *map(finding_text, self.findings)]
+        reading = [self.reading] if self.reading else []
+        lines = [f"{self.file}: {self.function}", *reading, "", *map(finding_text, self.findings)]
         return "\n".join([*lines, *(["", f"likely cause: {self.cause}"] if self.cause else [])])
 
 
@@ -164,6 +167,7 @@ class _Check:
             None if self.drift is None else tuple(map(float, self.drift)),
             self.coefficients,
             self.ratio,
+            self.step.reading,
             None if self.velocity is None else self.velocity.measured,
         )
 
@@ -384,7 +388,7 @@ class _Check:
             yield shown
             proved = proved if shown.holds else min(proved, 2)
         seen = ladder.ladder(self.step, runs["order"], standard)
-        if self.step.source.precision == "float":
+        if self.step.source.precision != "double":
             order, self.order = ladder.order_in_float(self.step, seen, standard, proved)
         else:
             order, self.order = ladder.order_on_ladder(self.step, seen)

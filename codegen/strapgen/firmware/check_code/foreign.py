@@ -13,16 +13,18 @@ import re
 import signal
 import subprocess
 import sys
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
+from functools import partial
 from itertools import accumulate, dropwhile
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from strapgen.firmware.check_code.bridge import ForeignSource, bridge_text, is_cpp
 from strapgen.firmware.check_code.foreign_arguments import (
     FORCES,
     FRAME_RATE,
@@ -30,13 +32,12 @@ from strapgen.firmware.check_code.foreign_arguments import (
     PUSHES,
     RATES,
     VELOCITY,
-    ForeignSource,
-    bridge_text,
-    definitions,
+    is_whole,
 )
+from strapgen.firmware.check_code.reading import in_words
 from strapgen.ir import checks
-from strapgen.ir.checks import suggestions
 from strapgen.ir.exceptions import CompilerError, InputError
+from strapgen.ir.renamed import warn
 from strapgen.ir.timing import timed
 from strapgen.ir.units import STANDARD_GRAVITY
 from strapgen.lab.recordings.rest import EARTH_RATE_RAD_S
@@ -46,11 +47,16 @@ from strapgen.run.backends import evaluator
 from strapgen.run.increments import windows
 from strapgen.storage import cache, drafts
 
+if TYPE_CHECKING:
+    from strapgen.firmware.check_code.interpreted import InterpretedSource
+
 Array = NDArray[np.float64]
 SCALARS = ("last", "first")
 SENSES = ("body-to-reference", "reference-to-body")
-#: Rates are means over the sampling interval, or those at its end.
-ENDS = "rates-at-ends"
+#: Rates are means over the sampling interval, or those at the time of the sample, which is the interval's end.
+ENDS = "instants"
+#: The name of these before.
+_OLD_ENDS = "rates-at-ends"
 RATE_INPUTS = (RATES, ENDS)
 INPUTS = ("increments", *RATE_INPUTS)
 #: Time between samples in s, unless another one is stated.
@@ -72,6 +78,8 @@ _LARGEST = 1e30
 _FLAT = 1e-3
 #: Without contraction to fused multiply-add every machine computes the same bits.
 _FLAGS = ("-O1", "-ffp-contract=off", "-g0", "-fPIC", "-fvisibility=hidden")
+#: Calls in which a function that has a result after several calls has two at least.
+_MOST_CALLS = 130
 _MODULE = "strapgen_foreign"
 _DECLARATION = (
     "int strapgen_foreign_run(long calls, const double *identity, const double *input, double *output);"
@@ -174,6 +182,8 @@ class ForeignRun:
     #: Whether the function wrote beside its arrays, or into arguments that are no result
     writes_beyond: bool = False
     changes_inputs: bool = False
+    #: Number of calls from a result to the next, as the function says; 0 if it says none
+    period: int = 1
     #: The same read as attitudes, for each segment; empty if the run stopped
     segments: tuple[SegmentRun, ...] = ()
 
@@ -182,10 +192,10 @@ class ForeignRun:
 class ForeignStep:
     """A user's function that is compiled, and how it is fed."""
 
-    source: ForeignSource
+    source: ForeignSource | InterpretedSource
     convention: Convention = Convention()
-    #: "increments" in rad, or "rates" in rad/s, which are the means over the time between samples, or "rates-
-    #: at-ends", which are those at the end of each
+    #: "increments" in rad, or "rates" in rad/s, which are the means over the time between samples, or "instants", which
+    #: are those at the time of each sample
     takes: str = "increments"
     #: Time between samples in s
     interval: Fraction = INTERVAL
@@ -193,31 +203,82 @@ class ForeignStep:
     #: handed; None where nothing is stated
     gravity: tuple[float, ...] | None = None
     frame_rate: tuple[float, ...] | None = None
-    module: Path = field(init=False)
+    #: The function's unit of angles in rad, and the fraction bits of the integers of its attitude
+    angle_unit: float = 1.0
+    state_bits: int = 0
+    #: Calls the function once for each row, see `run_calls`
+    calls: Callable[[Any, Any], ForeignRun] = field(init=False, compare=False, repr=False)
 
     def __post_init__(self) -> None:
+        if self.takes == _OLD_ENDS:
+            warn(f"--input {_OLD_ENDS}", f"--input {ENDS}")
+            object.__setattr__(self, "takes", ENDS)
         checks.choice("input", self.takes, INPUTS)
         if self.source.arguments.named(RATES) and self.takes == "increments":
             raise InputError(
                 f"--input {self.takes} contradicts the argument rates; --input {RATES} or {ENDS} fits it"
             )
-        arguments = self.source.arguments
+        arguments, source = self.source.arguments, self.source
         if self.takes == ENDS and arguments.translations:
             raise InputError(f"--input {ENDS} goes without a velocity behind the arrow of --arguments")
         if self.gravity is not None and VELOCITY not in arguments.meanings:
             raise InputError("--gravity-m-s2 goes with a velocity behind the arrow of --arguments")
         if self.frame_rate is not None and arguments.elements <= 3:
             raise InputError("--frame-rate-rad-s goes with an attitude behind the arrow of --arguments")
-        object.__setattr__(self, "module", compile_foreign(self.source))
+        if isinstance(source, ForeignSource):
+            self._require_scales(source)
+            source = self._with_period(source)
+            object.__setattr__(self, "source", source)
+            calls: Callable[[Any, Any], ForeignRun] = partial(run_foreign, compile_foreign(source))
+        else:
+            calls = source.run
+        object.__setattr__(self, "calls", calls)
+
+    def _with_period(self, source: ForeignSource) -> ForeignSource:
+        """Return the same with the number of calls to a result, if the function says when it has one."""
+        if source.publishes:
+            return source
+        arguments = source.arguments
+        rows = self._rows(Segment(np.zeros((_MOST_CALLS, arguments.count, 3)), settled=False))
+        period = run_foreign(compile_foreign(source), np.zeros(arguments.numbers), rows).period
+        if source.counter and not period:
+            raise InputError(f"--publishes: the number that it names does not change in {_MOST_CALLS} calls")
+        if period > 1 and len(arguments.fed) > 1:
+            raise InputError(f"--publishes {period} does not go with {arguments.fed[-1].name}")
+        return replace(source, publishes=max(period, 1))
+
+    def _require_scales(self, source: ForeignSource) -> None:
+        """Refuse integers whose scale is not known."""
+        if source.is_integer and self.angle_unit == 1:
+            raise InputError(
+                f"{source.function} computes in {source.precision}; --angle-unit is needed, the angle of a count in "
+                "rad, as 2**-20"
+            )
+        if is_whole(source.arguments.results[0]) and source.arguments.elements > 3 and not self.state_bits:
+            raise InputError(
+                f"{source.function} computes an attitude in integers; --state-bits is needed, the bits behind the "
+                "point, as 30 where 2**30 stands for 1"
+            )
+
+    @property
+    def reading(self) -> str:
+        """How the function is called, in one line; "" where nothing was read."""
+        if not isinstance(self.source, ForeignSource):
+            return self.source.reading
+        unit = {1.0: "rad", math.radians(1): "deg"}.get(self.angle_unit, f"{self.angle_unit:.6g} rad")
+        every = f", a result every {self.source.publishes} calls" if self.source.publishes > 1 else ""
+        return f"reads: {in_words(self.source.function, self.source.arguments, self.takes, unit)}{every}"
 
     @property
     def samples(self) -> int:
-        """Number of samples in a call."""
-        return self.source.arguments.count
+        """Number of samples in a call, or of all calls to a result."""
+        return self.source.arguments.count * max(self.source.publishes, 1)
 
     @property
     def unit(self) -> float:
         """The step from 1 to the next number of the function's precision."""
+        if self.source.is_integer:
+            return max(self.angle_unit, 2.0**-self.state_bits if self.state_bits else 0.0)
         return float(np.finfo(np.float32 if self.source.precision == "float" else np.float64).eps)
 
     @property
@@ -252,8 +313,11 @@ class ForeignStep:
         arguments = self.source.arguments
         rows = np.concatenate([self._rows(segment) for segment in segments])
         elements = arguments.elements
+        scale = self.angle_unit if elements == 3 else 2.0**-self.state_bits
+        scales = np.where(np.arange(arguments.numbers) < elements, scale, 1.0)
         identity = np.concatenate([read.identity(elements), np.zeros(arguments.numbers - elements)])
-        done = run_foreign(self.module, identity, rows)
+        done = self.calls(identity / scales, rows)
+        done = replace(done, outputs=done.outputs * scales)
         if not done.stopped and not np.abs(done.outputs).max() < _LARGEST:  # not finite: no number compares
             done = replace(
                 done, stopped="it leaves no finite numbers in its result, or does not write all of it"
@@ -286,9 +350,12 @@ class ForeignStep:
         quiet = np.zeros((self.settling if segment.settled else 0, count, 3))
         samples = np.concatenate([quiet, segment.increments]).reshape(-1, 3)
         numbers = windows(np.concatenate([np.zeros((previous, 3)), samples]), count, previous)
+        numbers = numbers / self.angle_unit
         if self.takes != "increments":
             numbers = numbers / float(self.interval)
-        numbers = numbers.reshape(len(numbers), -1)
+        if is_whole(self.source.arguments.samples):
+            numbers = np.diff(np.round(np.cumsum(numbers.reshape(-1, 3), axis=0)), axis=0, prepend=0.0)
+        numbers = numbers.reshape(len(segment.increments) + len(quiet), -1)
         beside = self._beside(segment, len(quiet))
         numbers = np.hstack(
             [numbers, *(np.broadcast_to(each, (len(numbers), each.shape[-1])) for each in beside)]
@@ -296,7 +363,7 @@ class ForeignStep:
         rows = np.empty((len(numbers), 3 + numbers[0].size))
         rows[:, 0] = np.arange(len(numbers)) == 0
         rows[:, 1] = float(self.interval)
-        rows[:, 2] = float(self.interval * count)
+        rows[:, 2] = float(self.interval * self.source.arguments.count)
         rows[:, 3:] = numbers
         return rows
 
@@ -316,16 +383,24 @@ class ForeignStep:
 
 def compile_foreign(source: ForeignSource) -> Path:
     """Compile a user's function."""
-    bridge, of = bridge_text(source), compiler.COMPILERS["C++"] if source.is_cpp else compiler.C
+    bridge, of = bridge_text(source), compiler.COMPILERS["C++"] if source.read.is_cpp else compiler.C
     with drafts.temporary_folder() as folder:
         text = folder / f"bridge{of.ending}"
         text.write_text(bridge, encoding="utf-8", newline="\n")
-        preprocessed = _preprocess(source, text)
-    key = cache.digest([preprocessed, bridge, compiler.C.identity(_FLAGS), of.identity()])
+        preprocessed = [
+            _preprocess(source, each).replace(str(text), "bridge") for each in (text, *source.sources)
+        ]
+    key = cache.digest(
+        [*preprocessed, bridge, repr(source.read.options), compiler.C.identity(_FLAGS), of.identity()]
+    )
 
     def fill(draft: Path) -> None:
         with timed("compile", source.function):
-            files, flags = {f"bridge{of.ending}": bridge}, [*_options(source), *_FLAGS]
+            files, flags = {f"bridge{of.ending}": bridge}, [*_options(source), *source.read.options, *_FLAGS]
+            for each in source.sources:
+                flags += ["-x", "c++" if is_cpp(each) else "c", str(each.resolve()), "-x", "none"]
+            if source.read.is_cpp:
+                flags.append("-fno-access-control")
             if reasons := compiler.compile_module(
                 draft, _MODULE, files, _DECLARATION, _DECLARATION, flags, of
             ):
@@ -336,7 +411,26 @@ def compile_foreign(source: ForeignSource) -> Path:
 
 
 def run_foreign(module: Path, identity: Any, rows: Any) -> ForeignRun:
-    """Call a compiled function once for each row, in a process of its own.
+    """Call a compiled function once for each row, see `run_calls`."""
+    runner = str(Path(__file__).with_name("foreign_runner.py"))
+    with cache.loadable(module) as (path, descriptor):
+        handed = [] if path == str(module) else [descriptor]
+        return run_calls([sys.executable, "-P", runner, path], identity, rows, handed)
+
+
+def run_calls(
+    command: Sequence[str],
+    identity: Any,
+    rows: Any,
+    descriptors: Sequence[int] = (),
+    patience: float | None = None,
+    **files: str,
+) -> ForeignRun:
+    """Have a command, in a process of its own, call a function once for each row.
+
+    `command` gets two more words, a folder and the number of rows. The folder holds the doubles of `identity` and
+    `input`, and further `files`; the command writes `output`, and `flags` last. What it refuses it says in `refused`,
+    and why the function ended early in `stopped`.
 
     `identity` (elements,): the state that a run begins with. `rows` (N, 3 + numbers): for each call whether a
     run begins, the sampling interval in s, the duration of the call in s, and the numbers of its arguments, the
@@ -344,37 +438,39 @@ def run_foreign(module: Path, identity: Any, rows: Any) -> ForeignRun:
     """
     values = np.ascontiguousarray(rows, np.float64)
     start = np.ascontiguousarray(identity, np.float64)
-    nothing = np.empty((0, start.size))
+    nothing, seconds = np.empty((0, start.size)), PATIENCE if patience is None else patience
     with drafts.temporary_folder() as folder:
         (folder / "input").write_bytes(values.tobytes())
         (folder / "identity").write_bytes(start.tobytes())
-        command = [sys.executable, "-P", str(Path(__file__).with_name("foreign_runner.py"))]
+        for name, text in files.items():
+            (folder / name).write_text(text, encoding="utf-8", newline="\n")
         try:
-            with cache.loadable(module) as (path, descriptor):
-                done = subprocess.run(
-                    [*command, path, str(folder), str(len(values))],
-                    cwd=folder,
-                    pass_fds=[] if path == str(module) else [descriptor],
-                    stdin=subprocess.DEVNULL,
-                    stdout=subprocess.DEVNULL,
-                    stderr=subprocess.DEVNULL,
-                    timeout=PATIENCE,
-                    check=False,
-                )
-        except subprocess.TimeoutExpired:
-            return ForeignRun(nothing, f"{len(values)} calls have not come to an end in {PATIENCE} s")
-        unloaded = folder / "unloaded"
-        if unloaded.is_file():
-            reason = unloaded.read_text(encoding="utf-8").rpartition(path)[2].strip(": ")
-            raise CompilerError(
-                f"the function cannot be linked: {reason}; include the file that defines it in the one to check"
+            done = subprocess.run(
+                [*command, str(folder), str(len(values))],
+                cwd=folder,
+                pass_fds=descriptors,
+                stdin=subprocess.DEVNULL,
+                stdout=subprocess.DEVNULL,
+                stderr=subprocess.DEVNULL,
+                timeout=seconds,
+                check=False,
             )
-        flags = folder / "flags"
-        if done.returncode or not flags.is_file():
-            return ForeignRun(nothing, _reason(done.returncode))
-        bits = int(flags.read_text(encoding="utf-8"))
+        except subprocess.TimeoutExpired:
+            return ForeignRun(nothing, f"{len(values)} calls have not come to an end in {seconds} s")
+        said = {name: _line(folder / name) for name in ("refused", "stopped", "flags")}
+        if said["refused"]:
+            raise CompilerError(said["refused"])
+        if done.returncode or not said["flags"]:
+            return ForeignRun(nothing, said["stopped"] or _reason(done.returncode))
+        bits = int(said["flags"])
         outputs = np.frombuffer((folder / "output").read_bytes()).reshape(len(values), start.size)
-    return ForeignRun(outputs, "", bool(bits & 1), bool(bits & 2))
+    stopped = "it has its result after another number of calls than before" if bits & 4 else ""
+    return ForeignRun(outputs, stopped, bool(bits & 1), bool(bits & 2), bits >> 8)
+
+
+def _line(file: Path) -> str:
+    """Return the text of a file as one line; "" if there is none."""
+    return " ".join(file.read_text(encoding="utf-8", errors="replace").split()) if file.is_file() else ""
 
 
 def _reason(status: int) -> str:
@@ -389,17 +485,17 @@ def _reason(status: int) -> str:
 
 def _preprocess(source: ForeignSource, text: Path) -> str:
     """Return all that the compiler reads, headers included."""
-    language = "c++" if source.is_cpp else "c"
-    command = [*compiler.C.command(), "-E", "-x", language, str(text)]
+    language = "c++" if is_cpp(text) else "c"
+    command = [*compiler.C.command(), *source.read.options, "-E", "-x", language, str(text)]
     done = subprocess.run(command, capture_output=True, text=True, errors="replace", check=False)
     if done.returncode:
         raise CompilerError(_diagnostics(source, done.stderr.splitlines()))
-    return done.stdout.replace(str(text), "bridge")
+    return done.stdout
 
 
 def _options(source: ForeignSource) -> list[str]:
     """Return the options of $CC for a file in C++, which another command may compile."""
-    words = compiler.C.command() if source.is_cpp else []
+    words = compiler.C.command() if source.read.is_cpp else []
     return list(dropwhile(lambda word: not word.startswith("-"), words))
 
 
@@ -407,23 +503,11 @@ def _diagnostics(source: ForeignSource, lines: list[str]) -> str:
     """Return the first error of the compiler, with the path of the file as the user wrote it."""
     errors = [line.strip() for line in lines if re.search(r"\berror\b:", line)] or lines[:1] or ["no reason"]
     error = errors[0].replace(str(source.file.resolve()), str(source.file))
-    names = list(definitions(source.file))
-    for option, name in (("--function", source.function), ("--init", source.init)):
-        unknown = re.search(r"implicit declaration|undeclared|not declared|undefined|has not been", error)
-        if name and unknown and name not in names and re.search(rf"\b{re.escape(name)}\b", error):
-            meant = suggestions("function", name, names)
-            guess = f" (did you mean {' or '.join(meant)}?)" if meant else ""
-            return (
-                f"{option}: {source.file} has no function {name}{guess}; it has {', '.join(names) or 'none'}"
-            )
+    reason = re.sub(r"^--\w+:[\d:]* *", "", error)
     if error.startswith("--init:"):
-        reason = re.sub(r"^--init:[\d:]* *", "", error)
-        return f"{source.init} of --init does not take the memory, the state or nothing: {reason}"
+        return f"{source.init} of --init cannot be called: {reason}; --show-shim shows the call"
     if error.startswith("--arguments:"):
-        reason = re.sub(r"^--arguments:[\d:]* *", "", error)
-        return (
-            f"{source.function} does not take these --arguments in --precision {source.precision}: {reason}"
-        )
+        return f"{source.function} cannot be called so: {reason}; --show-shim shows the call"
     return f"{source.file} does not compile: {error}"
 
 

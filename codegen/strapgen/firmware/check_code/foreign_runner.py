@@ -2,7 +2,7 @@
 
 Run as ``python -P foreign_runner.py MODULE FOLDER CALLS``. The folder holds the doubles of ``identity`` and ``input``;
 the results of all calls are written to ``output`` there, and what the calls did wrong to ``flags``, last. If the module
-cannot be loaded, ``unloaded`` says why.
+cannot be loaded, ``refused`` says why.
 """
 
 from __future__ import annotations
@@ -23,7 +23,11 @@ def main(module_path: str, folder_name: str, calls: int) -> None:
         module = importlib.util.module_from_spec(spec)
         loader.exec_module(module)
     except ImportError as error:  # a function that the file calls is defined nowhere
-        (folder / "unloaded").write_text(str(error), encoding="utf-8", newline="\n")
+        reason = str(error).rpartition(module_path)[2].strip(": ")
+        text = (
+            f"the function cannot be linked: {reason}; include the file that defines it in the one to check"
+        )
+        (folder / "refused").write_text(text, encoding="utf-8", newline="\n")
         return
     identity, rows = (folder / "identity").read_bytes(), (folder / "input").read_bytes()
     output = bytearray(calls * len(identity))

@@ -42,7 +42,7 @@ MOST_PREVIOUS = 3
 #: Rotation in rad of a call that shows directions: small enough to be read when it comes out 57.3 times as large.
 _TURN = 0.001
 #: Size of an increment of a product in rad, by precision: its square is seen, its fourth power is not.
-_SMALL = {"double": 0.002, "float": 0.02}
+_SMALL, _SMALL_COARSE = {"double": 0.002}, 0.02
 #: Calls without rotation after a probe, in which what comes late arrives.
 LATE = 2
 #: Samples from before a call whose products with those of the call are looked at: one more, for a late correction.
@@ -134,7 +134,7 @@ def pairs(samples: int) -> list[tuple[int, int]]:
 
 def small_turn(step: ForeignStep) -> float:
     """Return the size of the increments of products in rad."""
-    return min(_SMALL[step.source.precision], step.most)
+    return min(_SMALL.get(step.source.precision, _SMALL_COARSE), step.most)
 
 
 def product_segments(step: ForeignStep) -> list[Segment]:

@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
-from strapgen import catalogue
+from strapgen import catalogue, registration
 from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError
 from strapgen.registry import Registry
@@ -17,7 +17,7 @@ _PROFILES = f"{__package__}.rate_profiles"
 class MotionEntry(NamedTuple):
     """A motion of the table."""
 
-    #: Its parameters and the unit of each: "rad/s", "rad", "s" or "Hz"
+    #: Its parameters and the unit of each: "rad/s", "rad", "s", "Hz", "m" or "m/s"
     parameters: Mapping[str, str]
     #: "module:function": takes the parameters in SI units by name, and returns the `RateProfile` of the motion,
     #: or the motion itself. "" for a motion in closed form, which the kernels NAME-truth and NAME-increments
@@ -25,6 +25,8 @@ class MotionEntry(NamedTuple):
     function: str = ""
     #: Parameters in SI units that can be left out as long as another one is set
     defaults: Mapping[str, float] = {}
+    #: Whether all of them can be left out
+    complete: bool = False
 
     @property
     def title(self) -> str:
@@ -60,7 +62,16 @@ MOTIONS = Registry("motions", MotionEntry)
 
 def is_file(name: str) -> bool:
     """Return whether the name of a motion is that of a file."""
-    return name.endswith(".py")
+    return name.endswith((".py", *file_readers()))
+
+
+def file_readers() -> dict[str, str]:
+    """Return the functions that read the motions of other applications' files, by the ending of a file's name."""
+    return {
+        ending: place
+        for readers in registration.extensions("lab.motion-files")
+        for ending, place in readers.items()
+    }
 
 
 def parameters(

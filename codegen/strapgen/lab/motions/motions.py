@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property, lru_cache
-from typing import Any
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,6 +37,8 @@ _ENDINGS = {
     "rad": {"deg": math.radians(1), "rad": 1.0},
     "s": {"s": 1.0},
     "Hz": {"hz": 1.0},
+    "m": {"m": 1.0},
+    "m/s": {"m_s": 1.0},
 }
 
 
@@ -183,6 +185,14 @@ class Motion(ReadOnly):
         return result
 
 
+@runtime_checkable
+class InertialMotion(Protocol):
+    """A motion with a specific force of its own."""
+
+    def both_samples(self, interval: Fraction, first: int, stop: int) -> tuple[Array, Array]:
+        """Return angle increments in rad and velocity increments in m/s, body axes, as `Motion.samples` does."""
+
+
 @dataclass(frozen=True)
 class IntegratedMotion(Motion):
     """A motion whose increments are exact, and whose attitude is integrated.
@@ -267,7 +277,11 @@ def motion(name: str, /, **settings: float | str | Fraction) -> Motion:
     >>> motion("coning", a_deg_s=10, b_rad_s=0.5, g_deg_s=0).parameters["b"]
     0.5
     """
-    parameters = settings_of(f"motion {name}", keys(name), settings, MOTIONS[name].defaults)
+    known, entry = keys(name), MOTIONS[name]
+    if settings or not entry.complete:
+        parameters = settings_of(f"motion {name}", known, settings, entry.defaults)
+    else:
+        parameters = dict(entry.defaults)
     if not MOTIONS[name].function:
         return Motion(name, parameters)
     made = _made(name, parameters)

@@ -29,10 +29,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from strapgen import registration
 from strapgen.ir import checks, packages
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.renamed import renamed_parameters
-from strapgen.lab.motions.motion_names import is_file
+from strapgen.lab.motions.motion_names import file_readers, is_file
 from strapgen.lab.motions.motions import Motion, motion
 from strapgen.lab.motions.rate_expressions import rate_of
 from strapgen.lab.motions.rate_motion import RateMotion
@@ -190,7 +191,11 @@ def any_motion(
         raise InputError(
             f"{name} has its own numbers; --set goes with a motion that strapgen list motions shows"
         )
-    return read_motion(name, duration)
+    reader = file_readers().get(Path(name).suffix)
+    if reader is None:
+        return read_motion(name, duration)
+    read: Motion = registration.load(reader)(Path(name))
+    return read
 
 
 def require_consistent(users: Motion, duration: float | str | Fraction) -> None:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from strapgen.ir.exceptions import InputError
-from strapgen.lab.motions.motions import Motion
+from strapgen.lab.motions.motions import InertialMotion, Motion
 from strapgen.lab.motions.specific_forces import velocity_increments
 from strapgen.lab.recordings.recording import InertialRecording, Recording
 from strapgen.lab.sensor_errors.instruments import InstrumentErrors
@@ -87,6 +87,8 @@ class MeasuredMotion(Motion):
 
     def _true(self, interval: Fraction, first: int, stop: int) -> tuple[Array, Array]:
         """Return true angle and velocity increments."""
+        if isinstance(self.true, InertialMotion):
+            return self.true.both_samples(interval, first, stop)
         begin = first * float(interval)
 
         def attitude(time: Array) -> Array:
@@ -136,7 +138,7 @@ def measured(
     """
     if not any(errors.causes):
         return motion
-    if force is None and errors.needs_acceleration:
+    if force is None and errors.needs_acceleration and not isinstance(motion, InertialMotion):
         raise InputError("the errors of the gyros depend on acceleration; a specific force is needed")
     return MeasuredMotion(
         motion.name, motion.parameters, motion, errors, run, force or (0.0, 0.0, 0.0), start
@@ -201,8 +203,11 @@ def both_increments(
     `attitude`: returns the attitude at some times in s, that at the start included. `force`: specific force in
     m/s^2, constant in reference axes. `interval`: in s. Returns (count, 3): in rad and m/s, body axes.
     """
-    velocity = velocity_increments(attitude, force, interval, count)
+    true = motion.true if isinstance(motion, MeasuredMotion) else motion
+    if isinstance(true, InertialMotion):
+        both = true.both_samples(interval, 0, count)
+    else:
+        both = true.samples(interval, 0, count), velocity_increments(attitude, force, interval, count)
     if not isinstance(motion, MeasuredMotion):
-        return motion.samples(interval, 0, count), velocity
-    unit = MeasurementUnit(motion.errors, float(interval), motion.run)
-    return unit(motion.true.samples(interval, 0, count), velocity)
+        return both
+    return MeasurementUnit(motion.errors, float(interval), motion.run)(*both)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import Any, ClassVar, Protocol
@@ -65,24 +65,31 @@ def compare_system(
     inputs: Mapping[str, Any],
     settings: Settings | None = None,
     files: Mapping[str, RunsSamples] | None = None,
+    begin: Callable[[SystemRunner], SystemMemory] = SystemRunner.begin,
 ) -> list[OutputComparison]:
     """Run a system on back ends over the same samples and compare its outputs with those of a reference.
 
-    `inputs` (cycles, shape): samples in SI units.
+    `inputs` (cycles, shape): samples in SI units. `begin`: returns the memory with which a runner begins; files of a
+    user begin as their code does.
     """
     if settings is not None and settings.sensor is not None:
         inputs = {**inputs, **_counts(description, inputs, settings.sensor)}
     other = system_runner(description, reference, settings if BACKENDS[reference].fixed else None)
-    expected = other.run(inputs).values
+    expected = other.run(inputs, begin(other)).values
     rows = []
     runners: dict[str, RunsSamples] = {
         name: system_runner(description, name, settings if BACKENDS[name].fixed else None) for name in names
     }
     for name, runner in (runners | dict(files or {})).items():
-        values = runner.run(inputs).values
+        memory = begin(runner) if isinstance(runner, SystemRunner) else None
+        values = (
+            runner.run(inputs, memory).values
+            if isinstance(runner, SystemRunner)
+            else runner.run(inputs).values
+        )
         passes: PassAgreement | None = None
         if isinstance(runner, CompiledSystem):
-            passes = agreement(runner, other, inputs)
+            passes = agreement(runner, other, inputs, memory)
         for output in description.system.outputs:
             signal = description.system.cell(output).signal
             difference = float(distance(signal, values[output], expected[output]).max(initial=0))

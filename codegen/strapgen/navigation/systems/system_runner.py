@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import cached_property
@@ -108,6 +108,31 @@ class SystemRunner:
         memory.cells[cell] = np.repeat(
             self.stored(cell, array), len(memory.cells[cell]) // len(array), axis=0
         )
+
+    def settle(self, memory: SystemMemory, known: Set[str]) -> None:
+        """Compute what follows from cells that are known, and make it the value of the cycle before.
+
+        A stage that takes known cells and its own alone, and changes no known one, is called twice, so that what it
+        keeps of the cycle before is that of this one; so is what other stages keep of a value that follows.
+        """
+        follows, again = {*known}, True
+        while again:
+            again = False
+            for stage in self.system.stages:
+                results = {cell for _, cell in stage.results}
+                wires = {wire.source for wire in stage.wires if not wire.external}
+                if results & follows or wires - results - follows or any(w.external for w in stage.wires):
+                    continue
+                for _ in range(2):
+                    self._call_stage(memory, stage, {})
+                follows |= results
+                again = True
+        for stage in self.system.stages:
+            sources = {wire.input: wire.source for wire in stage.wires}
+            for name, source in sources.items():
+                kept = sources.get(f"previous_{name}")
+                if kept is not None and source in follows and kept not in follows:
+                    self.set(memory, kept, self.in_si(source, memory.cells[source]))
 
     def stored(self, name: str, values: Array) -> Array:
         """Return numbers in SI units as the system stores them."""

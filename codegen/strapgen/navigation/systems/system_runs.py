@@ -63,7 +63,7 @@ def _parameters(signal: Signal) -> str:
     return "cayley-klein" if signal.elements[0].endswith("_s") else "euler"
 
 
-def _state(signal: Signal, matrix: Array) -> Array:
+def attitude_state(signal: Signal, matrix: Array) -> Array:
     """Return an attitude as a signal has it."""
     return matrix if signal.size == 9 else np.asarray(evaluator(f"{_parameters(signal)}-from-dcm")(matrix))
 
@@ -76,7 +76,7 @@ def begun(runner: SystemRunner, start: Array | None) -> tuple[SystemMemory, Arra
     memory = runner.begin()
     cell = attitude_output(runner.system)
     if start is not None:
-        runner.set(memory, cell.name, _state(cell.signal, start))
+        runner.set(memory, cell.name, attitude_state(cell.signal, start))
     begin = matrices(cell.signal, [float(value) for value in cell.initial])[0] if start is None else start
     require_rotations(cell.name, np.asarray(begin)[None], np.zeros(1))
     return memory, begin
@@ -148,7 +148,7 @@ def system_history(runner: SystemRunner, recording: Recording, start: Array | No
     cell = attitude_output(runner.system)
     memory = None if start is None else begun(runner, start)[0]
     begin = np.array(
-        [float(value) for value in cell.initial] if start is None else _state(cell.signal, start)
+        [float(value) for value in cell.initial] if start is None else attitude_state(cell.signal, start)
     )
     begin = begin.reshape(1, *cell.signal.shape)
     course = system_course(runner, recording, memory)

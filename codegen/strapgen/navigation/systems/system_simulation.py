@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -20,10 +21,11 @@ if TYPE_CHECKING:
     from strapgen.cli.fixed_options import FixedOptions
     from strapgen.cli.options import MethodOptions, SeveralMethods
     from strapgen.cli.output import Output
+    from strapgen.lab.motions.motions import Motion
     from strapgen.lab.recordings.recording import Recording
     from strapgen.lab.run_options import RecordingOptions, RunOptions, RunOutput, SampleSource
     from strapgen.navigation.strapdown_command import CourseOutput, Start
-    from strapgen.navigation.systems.system_runner import SystemRunner
+    from strapgen.navigation.systems.system_runner import SystemMemory, SystemRunner
     from strapgen.navigation.systems.wiring import Description
 
 
@@ -57,12 +59,15 @@ def simulated_system(
         raise InputError("--print does not go with a described system; --record and --format csv do")
     from strapgen.cli.progress import waiting
     from strapgen.lab.runs_report import RunResult
+    from strapgen.navigation.systems.system_flight import over_earth
     from strapgen.navigation.systems.system_runs import simulate_system
 
     description = described_at(name, source)
     runner = runner_of(description, backend, fixed)
     profile, record = source.profile(), intervals.record
     assert source.duration is not None, "a motion has a duration"
+    if over_earth(profile) is not None:
+        return _over_earth(name, runner, profile, source, intervals, output)
     with waiting(f"running {name}"):
         run = simulate_system(runner, profile, source.duration, record, intervals.start(), source.force)
     facts = facts_of(runner, name) | {
@@ -74,6 +79,33 @@ def simulated_system(
     title = f"{name}, {backend}: {source.described(profile.name, ' motion')}"
     matrices, words = run if output.matrices else None, source.described(profile.name)
     output.show(RunResult(facts, run, output.title, matrices, words, plot_title=title))
+
+
+def _over_earth(
+    name: str,
+    runner: SystemRunner,
+    profile: Motion,
+    source: SampleSource,
+    intervals: RunOptions,
+    output: RunOutput,
+) -> None:
+    """Run on a motion over the earth, and deliver the errors of attitude, velocity and position."""
+    for option, given in (
+        ("--initial-deg", intervals.initial is not None),
+        ("--specific-force", source.specific_force is not None),
+        ("--matrices", output.matrices),
+    ):
+        if given:
+            raise InputError(f"{option} does not go with a motion over the earth, which has its own")
+    from strapgen.cli.progress import waiting
+    from strapgen.navigation.systems.system_flight import FlightResult, fly
+
+    assert source.duration is not None, "a motion has a duration"
+    with waiting(f"running {name}"):
+        flight = fly(runner, profile, source.duration, intervals.record)
+    facts = facts_of(runner, name) | {"motion": profile.name, "duration_s": float(source.duration)}
+    title = f"{name}, {runner.backend}: {source.described(profile.name, ' motion')}"
+    output.show(FlightResult(facts | source.facts, flight, output.title, plot_title=title))
 
 
 def _on_recording(
@@ -167,7 +199,7 @@ def compared_system(
     from strapgen.navigation.systems.system_comparison import SystemComparisonResult, compare_system
 
     names, reference = backends
-    description, inputs, title = _inputs(name, source)
+    description, inputs, title, begin = _inputs(name, source)
     with waiting(f"running {name}"):
         runners = {}
         for path in files[0] or ():
@@ -175,7 +207,7 @@ def compared_system(
             runners[path] = reader(path, description, [name], files[1])
         settings = with_counts(fixed.settings(1), {path: stated for path, (_, stated) in runners.items()})
         of_files = {str(path): runner for path, (runner, _) in runners.items()}
-        rows = compare_system(description, names, reference, inputs, settings, of_files)
+        rows = compare_system(description, names, reference, inputs, settings, of_files, begin)
     output.show(SystemComparisonResult(rows, f"{name}: {title}", reference))
     broken = [f"{row.output} on {row.backend}" for row in rows if row.share is not None and row.share > 1]
     if broken:
@@ -183,25 +215,36 @@ def compared_system(
         raise typer.Exit(1)
 
 
-def _inputs(name: str, source: SampleSource) -> tuple[Description, dict[str, NDArray[Any]], str]:
-    """Return the system, the samples of its inputs, and their source in words."""
+def _inputs(
+    name: str, source: SampleSource
+) -> tuple[Description, dict[str, NDArray[Any]], str, Callable[[SystemRunner], SystemMemory]]:
+    """Return the system, the samples of its inputs, their source in words, and the beginning of a run."""
     import numpy as np
 
     from strapgen.lab.sensor_errors.measured_motions import both_increments
+    from strapgen.navigation.systems.system_flight import begun, over_earth
+    from strapgen.navigation.systems.system_runner import SystemRunner
     from strapgen.navigation.systems.system_runs import cycles_of, samples
 
     if source.motion is None:
         data = whole_recording(recorded(source))
         description = described_along(name, data)
         angle = np.asarray(data.samples)
-        return description, samples(description, angle, np.zeros_like(angle)), Path(source.file).name
+        return (
+            description,
+            samples(description, angle, np.zeros_like(angle)),
+            Path(source.file).name,
+            SystemRunner.begin,
+        )
     description, profile = described_at(name, source), source.profile()
     assert source.duration is not None, "a motion has a duration"
     system = description.system
     count, interval = cycles_of(system, source.duration), 1 / system.sample_hz
     angle, velocity = both_increments(profile, profile.attitude, source.force, interval, count)
     title = f"{source.described(profile.name, ' motion')}, {count} cycles of {float(interval):.6g} s"
-    return description, samples(description, angle, velocity), title
+    true = over_earth(profile)
+    begin = SystemRunner.begin if true is None else partial(begun, motion=true)
+    return description, samples(description, angle, velocity), title, begin
 
 
 def system_along(

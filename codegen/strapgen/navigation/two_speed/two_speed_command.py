@@ -7,7 +7,6 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, NamedTuple
 
-from strapgen import registration
 from strapgen.cli.fixed_options import FixedOptions
 from strapgen.cli.generate_command import SourceOptions
 from strapgen.cli.generated_result import GeneratedSources
@@ -55,13 +54,7 @@ def two_speed(
 
     task = request(algorithm, sculling, target, fixed)
     sources = two_speed_sources.sources(*task)
-    files = sources.files if output.with_runs else sources.step_files
-    if output.project:
-        writer = registration.extension("two-speed.project", "--project")
-        added = writer.project_files(*task)
-        if not output.check:
-            writer.refuse_changed(output.out or Path(), added, output.force)
-        files = files | added
+    files = output.files(sources, "two-speed.project", *task)
     if output.check:
         output.show_difference(files, format)
         return
@@ -86,7 +79,10 @@ def _result(sources: Sources, loops: Sequence[Sources], written: Sequence[Path],
     places = {path.name: str(path) for path in written}
     functions = [
         GeneratedSources.of(
-            Choice(loop.kernel), loop, sources.target, [places[name] for name in loop.step_files]
+            Choice(loop.kernel),
+            loop,
+            sources.target,
+            [places[name] for name in loop.step_files if name in places],
         )
         for loop in loops
     ]

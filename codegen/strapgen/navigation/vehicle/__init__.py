@@ -1,0 +1,1 @@
+"""Vehicles that move over the earth: their courses, and what gyros and accelerometers measure on them."""
