@@ -14,7 +14,7 @@ Functions take the object, a name or a Choice alike:
   numbers     Settings, Format, gyro, exact: fixed point, pulses of a gyro, 40 digits
   motions     motion, read_motion, simulate; sensors with errors
   recordings  read, Recording, StampedGrid, propagate; rests, TrueAttitude, time_offset, attitude_error
-  judgement   compare, converge, certify, check, rounding_bounds; unknowns, vibration, study
+  judgement   compare, converge, certify, certify_system, check, rounding_bounds; unknowns, vibration, study
   your own    KernelBuilder, Signal, Stage, algebra, tableaux, windows, window_design; Target, Language
   navigation  read_system, system_runner, course, TwoSpeed, CommitLate, recording_attitudes, Preintegrator
   notebooks   formulas; to_rotation and from_rotation; plot, to_pandas and to_xarray of what runs return
@@ -119,6 +119,7 @@ if _typing.TYPE_CHECKING:
     from strapgen.navigation.preintegration.preintegrator import PreintegrationError as PreintegrationError
     from strapgen.navigation.preintegration.preintegrator import PreintegrationStatus as PreintegrationStatus
     from strapgen.navigation.preintegration.preintegrator import Preintegrator as Preintegrator
+    from strapgen.navigation.systems.system_certificate import certify_system as certify_system
     from strapgen.navigation.systems.system_runner import SystemRunner as SystemRunner
     from strapgen.navigation.systems.system_runner import system_runner as system_runner
     from strapgen.navigation.systems.wiring import read_system as read_system
@@ -180,6 +181,7 @@ _NAMES = {
         "PreintegrationStatus",
         "Preintegrator",
     ),
+    "navigation.systems.system_certificate": ("certify_system",),
     "navigation.systems.system_runner": (
         "SystemRunner",
         "system_runner",

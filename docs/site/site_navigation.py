@@ -54,7 +54,7 @@ SECTIONS = (
                 "microcontrollers",
                 "evidence",
             ),
-            *("check-foreign-code", "redundancy"),
+            *("check-foreign-code", "redundancy", "fmu"),
         ),
     ),
     Section(

@@ -153,11 +153,10 @@ def test_the_right_example_holds():
     outcome = check_foreign(example("correct.c"))
     assert (outcome.holds, outcome.cause, failed(outcome)) == (True, None, [])
     assert outcome.order == pytest.approx(3, abs=0.05)
-    names = "calls scalar sense axes,at rest,delay,rotation,coefficients,order drift symmetry norm runs"
-    assert [finding.name for finding in outcome.findings] == names.replace(" ", ",").replace(
-        "at,", "at "
-    ).split(",")
-    assert all(finding.holds is True for finding in outcome.findings)
+    names = "calls scalar sense axes,at rest,delay,rotation,coefficients,order drift symmetry norm runs NaN,long run"
+    listed = names.replace(" ", ",").replace("at,", "at ").replace("long,", "long ").split(",")
+    assert [finding.name for finding in outcome.findings] == listed
+    assert [finding.name for finding in outcome.findings if finding.holds is not True] == ["NaN"]
     # The closed form with the correction d_before x d / 12: alpha^2 / T (sin(l) - l / 2 - (2 sin(l) - sin(2 l)) ...)
     lam, alpha = 0.2 * math.pi, math.radians(1)
     rate = alpha**2 / 0.01 * (math.sin(lam) / 2 - lam / 2 + (1 - math.cos(lam)) * math.sin(lam) / 6)
@@ -173,8 +172,14 @@ def test_a_fault_is_seen_and_named(name):
     assert failed(outcome) == (["runs"] if name == "state_kept.c" else ["coefficients", "order", "drift"])
     data = json.loads(outcome.written("json"))
     old = {"file", "holds", "order", "drift_deg_h", "closed_form_deg_h", "cause", "checks"}
-    assert data.keys() == old | {"schema", "drift_by_axis_deg_h", "coefficients", "coefficient_ratio"}
-    assert math.hypot(*data["drift_by_axis_deg_h"]) == pytest.approx(outcome.drift_deg_h)
+    new = {"drift_axes_deg_h", "drift_by_axis_deg_h", "coefficients", "coefficient_ratio", "cause_confidence"}
+    assert data.keys() == old | new | {"schema", "next_cause", "replacement", "replacement_command"}
+    assert math.hypot(*data["drift_axes_deg_h"]) == pytest.approx(outcome.drift_deg_h)
+    assert data["drift_by_axis_deg_h"] == data["drift_axes_deg_h"]
+    if name == "state_kept.c":  # no fault of the coefficients
+        assert data["cause_confidence"] is data["replacement"] is None
+    else:
+        assert data["cause_confidence"] > 0.99 and data["next_cause"] not in (None, outcome.cause)
     assert {tuple(check) for check in data["checks"]} == {("name", "holds", "value")}
     # What the faults leave follows from the closed form: correction times factor.
     if name in ("correction_absent.c", "wrong_sign.c", "factor_two.c"):
@@ -182,6 +187,43 @@ def test_a_fault_is_seen_and_named(name):
         factor = {"correction_absent.c": 0, "wrong_sign.c": -1, "factor_two.c": 2}[name]
         expected = absent + factor * (closed_form_deg_h(design(1, 1)) - absent)
         assert outcome.drift_deg_h == pytest.approx(abs(expected), rel=1e-3)
+
+
+@pytest.mark.long
+def test_the_generated_code_that_is_shown_corrects_coning(outcome):
+    faulty = PARTS + (
+        "void step(const double past[1][3], const double d[3], double rotation[3])\n"
+        "{\n    for (int i = 0; i < 3; i++) rotation[i] = d[i];\n}\n"
+    )
+    arguments = "previous[1][3], increments[3] -> rotation[3]"
+    checked = outcome(faulty, arguments)
+    assert checked.cause == causes.ABSENT and checked.replacement in checked.text().replace("\n    ", "\n")
+    inputs = [
+        f"const double {name}_{axis} = {array}[{k}];"
+        for name, array in (("past1", "past[0]"), ("d1", "d"))
+        for k, axis in enumerate("xyz")
+    ]
+    results = [f"rotation[{k}] = phi_{axis};" for k, axis in enumerate("xyz")]
+    body = "\n".join([*inputs, checked.replacement, *results])
+    mended = outcome(faulty.replace("for (int i = 0; i < 3; i++) rotation[i] = d[i];", body), arguments)
+    assert (mended.holds, mended.replacement) == (True, None)
+
+
+def test_a_cause_is_as_sure_as_the_next_one_allows():
+    # One sample a call: 1/12 is right. The residuals of the wrong sign and of no correction are 0.01 and 0.07333.
+    table = {(-4, 0): 0.0, (-3, 0): 0.0, (-2, 0): 0.0, (-1, 0): -1 / 12 + 0.01}
+    value, other = causes.confidence(causes.Products(1, table, table), causes.WRONG_SIGN)
+    assert (value, other) == (pytest.approx(1 - 0.01 / (1 / 12 - 0.01)), causes.ABSENT)
+    # Two samples: the wrong sign and the reverse order are the same.
+    table = {(older, newer): 0.0 for newer in (0, 1) for older in range(-4, newer)} | {(0, 1): -2 / 3}
+    products = causes.Products(2, table, table)
+    value, other = causes.confidence(products, causes.cause(products))
+    assert (value, other) == (0.0, causes.REVERSED)
+    # A size of its own leaves nothing.
+    table = {(-4, 0): 0.0, (-3, 0): 0.0, (-2, 0): 0.0, (-1, 0): 0.9 / 12}
+    products = causes.Products(1, table, table)
+    value, other = causes.confidence(products, causes.cause(products))
+    assert (round(value, 6), other) == (1.0, causes.RIGHT)
 
 
 def test_there_is_an_example_of_every_fault():

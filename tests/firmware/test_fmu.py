@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import re
+import shutil
 import zipfile
 from collections.abc import Mapping
 from functools import cache
@@ -166,6 +167,18 @@ def test_strict_compilers_are_silent(unit, kind, tmp_path):
     assert [line for line in sources[own].splitlines() if len(line) > 99] == []
     needed("gcc")
     assert complaints("gcc", tmp_path, [own]) == ""
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("kind", archive.VERSIONS)
+def test_the_sources_build_as_the_description_says(kind, written):
+    build = pytest.importorskip("fmpy.build")
+    unit, samples = kernel("dcm", "c-fixed", GYRO), counts(20)
+    folder = Path(fmpy.extract(written(unit, kind)))
+    shutil.rmtree(folder / "binaries")
+    build.build_platform_binary(folder)
+    found = run(str(folder), {"increments": samples}, ["state"])
+    assert found["state"].tolist() == [list(state) for state in model_states(samples)]
 
 
 # Runs against the twins

@@ -377,7 +377,8 @@ def test_the_right_example_passes(check):
     assert printed.startswith(f"{PLACE}/correct.c: integrator_update\nreads: {reads}\n\n")
     assert "FAILS" not in printed and "cause" not in printed
     assert re.search(
-        r"^  holds drift +9\.783 deg/h; closed form on 1 sample and 1 before 9\.784, coning-\w+ 9\.783$",
+        r"^  holds drift +9\.783 deg/h \(0, 9\.781, 0\.1707 about x, y, z\) on a cone of 1 deg at 10 Hz about y, "
+        r"samples at 100 Hz; closed form on 1 sample and 1 before 9\.784, coning-\w+ 9\.783$",
         printed,
         re.M,
     )
@@ -386,7 +387,10 @@ def test_the_right_example_passes(check):
 def test_a_fault_exits_with_1_and_names_its_cause(check):
     status, printed, said = check(f"{PLACE}/wrong_sign.c {COMMAND}")
     assert status == 1
-    assert printed.endswith("\n\nlikely cause: correction of the wrong sign\n")
+    assert (
+        "\n\nlikely cause: correction of the wrong sign (confidence 1.00; next best: correction abs"
+        in printed
+    )
     (excerpt,) = re.findall(r"^```text\n(.*?)^```", DOCUMENT, flags=re.MULTILINE | re.DOTALL)
     assert all(part in printed for part in excerpt.split("...\n"))
     fails = "coefficients, order, drift; likely cause: correction of the wrong sign"
@@ -405,7 +409,8 @@ def test_json_keeps_its_keys(check, tmp_path):
         "holds": False,
         "cause": "state kept between runs",
     }
-    old, new = {"order", "drift_deg_h", "closed_form_deg_h"}, {"drift_by_axis_deg_h", "coefficient_ratio"}
+    old, new = {"order", "drift_deg_h", "closed_form_deg_h"}, {"drift_axes_deg_h", "coefficient_ratio"}
+    new |= {"drift_by_axis_deg_h", "cause_confidence", "next_cause", "replacement", "replacement_command"}
     assert {*data} == {"schema", "file", "holds", "cause", "coefficients", *old, *new}
     assert data["coefficients"] == [
         {"older": -1, "newer": 0, "seen": pytest.approx(1 / 12, abs=1e-6), "wanted": 1 / 12}

@@ -591,7 +591,7 @@ def test_a_correction_that_is_wrong_about_one_axis_drifts_about_it(outcome, axis
     absent, right = 127.34, 9.78
     text = quaternion().replace("cross(before, d, c);", f"cross(before, d, c); c[{axis}] = 0;")
     checked = outcome(text, TAKES_4, FIRST_SCALAR, init="begin")
-    drift = np.abs(checked.drift_by_axis_deg_h)
+    drift = np.abs(checked.drift_axes_deg_h)
     assert drift[axis] == pytest.approx(absent, rel=1e-3)
     assert (np.delete(drift, axis) < right).all()
 

@@ -505,6 +505,25 @@ def test_further_files_and_options_are_compiled(tmp_path, monkeypatch):
         read_source("helper.c", "f", compile_commands="compile_commands.json")
 
 
+@pytest.mark.parametrize(
+    ("angle", "cause"),
+    [
+        pytest.param("(int32_t)((uint32_t)delta_angle[i] << 8)", None, marks=pytest.mark.long),
+        (  # 2**31 is passed at 25 rad/s
+            "(int32_t)((uint32_t)delta_angle[i] << 11) / 8",
+            "at 30 rad/s (1719 deg/s) its integers overflow: a call turns wrong by 1.67 of it; it holds up to 15 rad/s",
+        ),
+    ],
+)
+def test_integers_that_overflow_in_a_fast_motion_are_seen(outcome, angle, cause):
+    text = INTEGER.replace("FACTOR", "1").replace("(int64_t)delta_angle[i] << 8", angle)
+    checked = outcome(text, init="begin", angle_unit=2.0**-22, state_bits=30)
+    assert [finding.name for finding in checked.findings if finding.holds is False] == (
+        ["fast"] if cause else []
+    )
+    assert checked.cause == cause
+
+
 def test_integers_are_fed_without_a_sum_of_roundings(tmp_path):
     (tmp_path / "a.c").write_text(
         "void f(short q[4], const int delta_angle[3]) { q[0] = (short)(q[0] + delta_angle[0]); q[3] = 0; }\n"

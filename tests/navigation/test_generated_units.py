@@ -59,7 +59,7 @@ def test_python_unit_stores_the_values_of_the_c(name, target, systems, tmp_path,
     module = twin(fitted(systems[name], python, SETTINGS.get(python)), tmp_path)
     inputs = samples(systems[name], 300, rng)
     rows = compiled.samples(inputs)
-    trace = compiled.trace(rows)
+    trace = compiled.trace(rows).cells
     memory = module.Memory()
     for k in range(301):
         for cell in compiled.system.cells:

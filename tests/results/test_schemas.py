@@ -33,6 +33,7 @@ COMMANDS = {
     "simulate dcm --recording tests/data/increments.csv --title a": "attitude",
     "log tests/data/increments.csv": "log",
     "certify euler --recording tests/data/increments.csv": "certificate",
+    "certify two-speed-euler --recording examples/inertial_log.csv": "system-certificate",
     f"compare euler --method rk1,rk2 --backend numpy,c {RUN}": "comparison",
     "compare euler,dcm --method rk1 --recording tests/data/increments.csv": "spread",
     "converge euler --method rk1 --steps 1/2,1/4 --duration 1 --backend numpy": "convergence",
@@ -57,6 +58,7 @@ COMMANDS = {
         "system-comparison"
     ),
     "simulate examples/strapdown.toml --motion polar --step 0.01 --duration 1": "flight",
+    "study flight-errors examples/navigator.toml --errors ins-1 --duration 2 --sample-hz 50 --runs 10": "flight-errors",
     "study system examples/strapdown.toml --sample-hz 100 --duration 1 --backend c-float": "system-study",
     "strapdown euler --recording examples/inertial_log.csv --fast-cycles 4 --slow-cycles 50": "course",
     "redundancy examples/hexad.toml --out OUT": "redundant-sensors",

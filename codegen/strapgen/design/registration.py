@@ -37,6 +37,9 @@ REGISTRATION = Registration(
         "frontier": f"{__package__}.frontier:FrontierResult",
         "selection": f"{__package__}.selection.selection_report:SelectionResult",
     },
-    extensions={"lab.whole-recordings": f"{__package__}.commit_late:late_recording"},
+    extensions={
+        "lab.whole-recordings": f"{__package__}.commit_late:late_recording",
+        "lab.late-certificate": f"{__package__}.commit_late.late_certificate:certify_late",
+    },
     requires=("lab", "analysis"),
 )

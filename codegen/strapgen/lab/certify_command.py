@@ -6,13 +6,14 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
+from strapgen import registration
 from strapgen.cli.fixed_options import RUN_OPTIONS, FixedOptions
 from strapgen.cli.option_groups import Needs, OneOf, Shown, grouped, rules
-from strapgen.cli.options import STEP_OPTIONS, MethodOptions, StepAlgorithm, option
+from strapgen.cli.options import STEP_OPTIONS, MethodOptions, RunAlgorithm, option
 from strapgen.cli.output import Output
 from strapgen.cli.values import Positive, names, whole
 from strapgen.ir.exceptions import InputError
-from strapgen.lab.run_options import RecordingOptions, RunOptions
+from strapgen.lab.run_options import RecordingOptions, RunOptions, described
 
 if TYPE_CHECKING:
     from strapgen.catalogue import Choice
@@ -32,7 +33,7 @@ _STEP_OFF = 0.01
     Needs("--amplitude-deg-s", "--band-hz"),
 )
 def certify(
-    algorithm: StepAlgorithm,
+    algorithm: RunAlgorithm,
     *,
     method: Annotated[MethodOptions, Shown(only=STEP_OPTIONS)],
     target: Annotated[
@@ -56,6 +57,15 @@ def certify(
             panel="Input",
         ),
     ] = None,
+    late: Annotated[
+        bool,
+        option(
+            "--commit-late",
+            help="The unit that strapgen window generate writes: the window's attitude is committed late, from the "
+            "first sample to the last, beside its answer of now.",
+            panel="Algorithm",
+        ),
+    ] = False,
     intervals: Annotated[RunOptions, Shown(only=("orthonormalize", "scheme", "initial"))],
     band: Annotated[
         Positive | None,
@@ -101,8 +111,27 @@ def certify(
 
     With --band-hz and --amplitude-deg-s you also see how far the attitude can be from the true one.
 
+    With --commit-late it is the unit that commits the attitude of a window late: you see the rounding at its start, at
+    its end and in its answer of now.
+
+    Of a described system, such as two-speed-euler or a file, you see the rounding of each output, as of attitude,
+    velocity and position, and which stage did most of it.
+
     Example: strapgen certify euler --recording examples/gyro_log.csv --gaps bridge
     """
+    options = {
+        "--states": states,
+        "--orthonormalize": intervals.orthonormalize,
+        "--scheme": intervals.scheme,
+        "--band-hz": band,
+        "--results": results,
+        "--jobs": None if jobs == 1 else jobs,
+    }
+    given = [name for name, value in options.items() if value is not None]
+    if (other := described(algorithm)) is not None:
+        backend = _backend_of(target, fixed.word or 32, False)
+        given += ["--commit-late"] if late else []
+        return other.certify(algorithm, given, method, backend, source, intervals, fixed, output)
     choice = method.choose(algorithm)
     output.check(algorithm, *method.files, source.file, states)
     if choice.increments is None:
@@ -114,6 +143,12 @@ def certify(
     from strapgen.lab.run_options import whole_recording
 
     data = whole_recording(source.load())
+    if late:
+        for name in given:
+            raise InputError(
+                f"{name} does not go with --commit-late, whose unit normalizes and runs by itself"
+            )
+        return _late(choice, target, data, fixed, intervals, source, output)
     run = _run(choice, target, states, data, fixed, intervals)
     source.say_remarks(data)
     with waiting(f"certifying {choice.kernel}"):
@@ -131,6 +166,28 @@ def certify(
     output.show(result)
     if result.faults:
         raise typer.Exit(1)
+
+
+def _late(
+    choice: Choice,
+    target: str,
+    data: Recording,
+    fixed: FixedOptions,
+    intervals: RunOptions,
+    source: RecordingOptions,
+    output: Output,
+) -> None:
+    """Certify the unit that commits the attitude of a window late."""
+    from strapgen.cli.progress import waiting
+
+    certified = registration.extension("lab.late-certificate", "--commit-late")
+    backend = _backend_of(target, fixed.word or 32, False)
+    fixed.check_backend(backend)
+    settings = _settings(backend, fixed, choice, data.interval, data.largest)
+    source.say_remarks(data)
+    with waiting(f"certifying {choice.kernel}"):
+        result = certified(choice, backend, data, settings=settings, initial=intervals.start())
+    output.show(replace(result, source=source.source))
 
 
 def _run(

@@ -640,13 +640,14 @@ class WorkerOptions:
 
 
 class DescribedAlgorithms(NamedTuple):
-    """What runs algorithms of a kind: the functions take what the commands ``simulate`` and ``compare`` read."""
+    """What runs algorithms of a kind: the functions take what the commands of their names read."""
 
     #: Tells whether a name stands for one
     covers: Callable[[object], bool]
     #: Run one, and deliver the result
     simulate: Callable[..., None]
     compare: Callable[..., None]
+    certify: Callable[..., None]
 
 
 def described(name: Any) -> DescribedAlgorithms | None:

@@ -32,6 +32,7 @@ from strapgen.ir.sources import Sources
 from strapgen.run.backend_names import BACKENDS
 from strapgen.run.backends import fit_settings
 from strapgen.run.evaluators import Array, integers, numbers
+from strapgen.run.increments import pulses
 
 
 class CommitLate:
@@ -134,6 +135,12 @@ class CommitLate:
     def _numbers(self, attitude: Array) -> Array:
         """Return an attitude of the unit as numbers."""
         return attitude if self._state is None else numbers(self._state, attitude)
+
+    def taken(self, samples: Array) -> Array:
+        """Return samples as the unit takes them, (N, 3): in fixed point what rounding leaves goes into the next one."""
+        if self._state is None:
+            return np.asarray(np.asarray(samples, self.identity.dtype), np.float64)
+        return np.asarray(pulses(np.asarray(samples)[:, None], self._sample.unit)[:, 0])
 
     @property
     def attitude(self) -> Array:

@@ -42,9 +42,12 @@ from strapgen.firmware.check_code.probes import (
     rest_segments,
     sizes_in_words,
 )
+from strapgen.firmware.check_code.remedy import Remedy, remedy
 from strapgen.firmware.check_code.rotation import placement, rotation, rotation_segments
+from strapgen.firmware.check_code.upsets import upsets
 from strapgen.firmware.check_code.velocity import Velocity
 from strapgen.firmware.check_code.velocity_findings import MeasuredTranslation, VelocityFindings
+from strapgen.ir.renamed import renamed
 from strapgen.lab.motions.motions import motion
 from strapgen.results.records import INTERNAL, Properties, entry, properties
 from strapgen.results.result import Result
@@ -84,11 +87,12 @@ def without_words(findings: Sequence[Finding]) -> list[MeasuredCheck]:
     return [MeasuredCheck(finding.name, finding.holds, finding.measured) for finding in findings]
 
 
+@renamed(drift_by_axis_deg_h="drift_axes_deg_h")
 @dataclass(frozen=True)
 class ForeignResult(Result):
     """The findings on a user's function."""
 
-    computed: ClassVar[Properties] = properties(holds=entry())
+    computed: ClassVar[Properties] = properties(holds=entry(), of_old_name=entry(key="drift_by_axis_deg_h"))
 
     file: str
     function: str = field(metadata=INTERNAL)
@@ -104,17 +108,30 @@ class ForeignResult(Result):
     #: The likely cause of what fails; None if nothing does, or the cause is not known
     cause: str | None
     #: The drift about x, y and z of the reference axes in deg/h; its length is the magnitude
-    drift_by_axis_deg_h: tuple[float, ...] | None = None
+    drift_axes_deg_h: tuple[float, ...] | None = None
     #: Those of cross products that are seen or wanted; none where samples are rates at instants
     coefficients: tuple[MeasuredCoefficient, ...] = ()
     #: What they correct of the drift on coning to leading order, 1 if they are right
     coefficient_ratio: float | None = None
+    #: How sure the cause of wrong coefficients is, from 0 to 1; None where it was found otherwise
+    cause_confidence: float | None = None
+    #: What explains them next best
+    next_cause: str | None = None
+    #: Lines of generated C that correct coning on the same samples; None where the coefficients hold
+    replacement: str | None = None
+    #: The command that generates them
+    replacement_command: str | None = None
     #: What its parameters are taken for
     reading: str = field(default="", metadata=INTERNAL)
     #: Of a function that computes a velocity
     translation: MeasuredTranslation | None = field(
         default=None, metadata=entry(spread=True, optional=True, kind=MeasuredTranslation)
     )
+
+    @property
+    def of_old_name(self) -> tuple[float, ...] | None:
+        """The same as drift_axes_deg_h, under the name that it had before."""
+        return self.drift_axes_deg_h
 
     @property
     def holds(self) -> bool:
@@ -129,7 +146,15 @@ class ForeignResult(Result):
         """Return the findings, a line each, and the likely cause of a failure."""
         reading = [self.reading] if self.reading else []
         lines = [f"{self.file}: {self.function}", *reading, "", *map(finding_text, self.findings)]
-        return "\n".join([*lines, *(["", f"likely cause: {self.cause}"] if self.cause else [])])
+        if self.cause:
+            sure = ""
+            if self.cause_confidence is not None:
+                sure = f" (confidence {self.cause_confidence:.2f}; next best: {self.next_cause})"
+            lines += ["", f"likely cause: {self.cause}{sure}"]
+        if self.replacement:
+            code = [f"    {line}" for line in self.replacement.splitlines()]
+            lines += ["", f"generated code that corrects coning, of {self.replacement_command}:", *code]
+        return "\n".join(lines)
 
 
 def check_foreign(step: ForeignStep) -> ForeignResult:
@@ -149,11 +174,16 @@ class _Check:
         self.closed: float | None = None
         self.coefficients: tuple[MeasuredCoefficient, ...] = ()
         self.ratio: float | None = None
+        self.sure: tuple[float, str] | None = None
+        self.remedy: Remedy | None = None
+        #: That of the function, once it is known
+        self.convention: Convention | None = None
         self.velocity = VelocityFindings(Velocity(step)) if step.source.arguments.translations else None
 
     def outcome(self) -> ForeignResult:
         """Run all checks."""
         findings = tuple(self.findings())
+        findings += tuple(self.upsets(findings))
         failed = any(finding.holds is False for finding in findings)
         cause = "; ".join(dict.fromkeys(self.causes)) if failed and self.causes else None
         return ForeignResult(
@@ -167,6 +197,10 @@ class _Check:
             None if self.drift is None else tuple(map(float, self.drift)),
             self.coefficients,
             self.ratio,
+            self.sure[0] if self.sure else None,
+            self.sure[1] if self.sure else None,
+            self.remedy.code if self.remedy else None,
+            self.remedy.command if self.remedy else None,
             self.step.reading,
             None if self.velocity is None else self.velocity.measured,
         )
@@ -207,6 +241,14 @@ class _Check:
             yield from self.velocity.findings(runs)
             self.causes.extend(self.velocity.causes)
         yield self.repeated(*runs["runs"])
+
+    def upsets(self, found: Sequence[Finding]) -> Iterator[Finding]:
+        """Yield the findings on input that fails and on long runs, once the function is known to work otherwise."""
+        if self.convention is not None:
+            lasts = all(finding.holds for finding in found if finding.name == "norm")
+            for finding, cause in upsets(self.step, self.convention, long=lasts):
+                self.causes.extend([cause] if cause else [])
+                yield finding
 
     def failed(self, name: str, text: str, measured: float | None = None) -> Finding:
         """Return a finding whose text is its own cause."""
@@ -277,6 +319,7 @@ class _Check:
         self, convention: Convention, runs: dict[str, tuple[SegmentRun, ...]]
     ) -> Generator[Finding, None, dict[str, tuple[SegmentRun, ...]]]:
         """Yield the findings on the attitude; return all runs as they would be in a resting frame."""
+        self.convention = convention
         still = rest(self.step, runs["at rest"])
         resting = self.at_rest(still)
         yield resting
@@ -406,6 +449,9 @@ class _Check:
         holds = coning_causes.corrects_coning(known) and not coning_causes.weights_off(known)
         if (said := coning_causes.cause(known)) is not None:
             self.causes.append(said)
+            self.sure = coning_causes.confidence(known, said)
+        if not holds:
+            self.remedy = remedy(coning_causes.nearest(known)[1])
         text = f"{coning_causes.in_words(self.coefficients)}; {self.ratio:.3f} of what coning needs"
         return Finding("coefficients", holds, text, self.ratio, coning_causes.tolerance(known))
 

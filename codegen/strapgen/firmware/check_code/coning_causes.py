@@ -18,6 +18,8 @@ SUM_LATE = "the sum of the samples before lacks the last one (one sample late)"
 REVERSED = "the samples of a call are taken in reverse order"
 EARLIER_REVERSED = "the samples from before a call are taken in reverse order, the newest first"
 STATE_KEPT = "state kept between runs"
+#: What stands beside causes where the coefficients have none.
+RIGHT = "no fault of the coefficients"
 
 #: Most coefficients that a line shows; those come first that differ most from what is wanted.
 _MOST_SHOWN = 4
@@ -101,18 +103,22 @@ def measured_design(products: Products) -> Design:
 
 def wanted(products: Products) -> Table:
     """Return the coefficients of the published correction whose pattern is nearest to that of a function."""
+    return nearest(products)[0]
+
+
+def nearest(products: Products) -> tuple[Table, Design]:
+    """Return the published correction whose pattern is nearest to that of a function: coefficients, and design."""
     pairs, seen = list(products.at_once), products.at_once
-    tables = [
-        ({pair: ideal.get(pair, 0.0) for pair in pairs}, base) for ideal, base in _ideals(products.samples)
-    ]
-    totals = [{pair: c + base.get(pair, 0.0) for pair, c in ideal.items()} for ideal, base in tables]
-    nearest = min(totals, key=lambda total: _size(_less(seen, total)))
+    known = [*_published(products.samples)]
+    tables = [{pair: ideal.get(pair, 0.0) for pair in pairs} for ideal, _, _ in known]
+    totals = [_plus(table, base) for table, (_, base, _) in zip(tables, known, strict=True)]
+    number = min(range(len(known)), key=lambda number: _size(_less(seen, totals[number])))
     most = _MULTIPLE
-    for (ideal, base), total in zip(tables, totals, strict=True):
-        alike = _alignment(_less(seen, base), ideal)
+    for k, (table, (_, base, _)) in enumerate(zip(tables, known, strict=True)):
+        alike = _alignment(_less(seen, base), table)
         if alike > most:
-            most, nearest = alike + _AS_GOOD, total
-    return nearest
+            most, number = alike + _AS_GOOD, k
+    return {pair: totals[number].get(pair, 0.0) for pair in pairs}, known[number][2]
 
 
 def ratio(products: Products) -> float:
@@ -164,30 +170,77 @@ def cause(products: Products) -> str | None:
         return uneven
     if comes_late(products):
         return LATE
+    for said, base, table in _faults(products):
+        if _fits(products, base, table):
+            return said
+    return None if corrects_coning(products) else _by_size(products)
+
+
+def _faults(products: Products) -> Iterator[tuple[str, Table, Table]]:
+    """Yield the known faults: in words, the products that a correction is added to, and that correction."""
     now, samples, noise = products.at_once, products.samples, products.noise
-    right = corrects_coning(products)
-    if not right and not all(_any(_less(now, base)) for base in _bases(now, samples)):
-        return ABSENT
-    for ideal, base in _ideals(samples):
-        correction = _less(now, base)
+    ideals, right = [*_ideals(samples)], corrects_coning(products)
+    for base in [] if right else _bases(now, samples):
+        yield ABSENT, base, {}
+    for ideal, base in ideals:
         for factor, said in ((-1.0, WRONG_SIGN), (2.0, FACTOR_TWO), (0.5, FACTOR_TWO)):
-            if _alike(correction, {pair: factor * c for pair, c in ideal.items()}, noise):
-                return said
-        if any(_alike(correction, shifted, noise) for shifted in _delayed(ideal, samples)):
-            return LATE
-    if not right and _is_earlier_reversed(now, samples, noise):
-        return EARLIER_REVERSED
-    ideal, turned = _one_by_one(samples)
-    late_sum = {(older, newer): c for (older, newer), c in turned.items() if newer - older > 1}
-    if samples > 1 and _alike(_less(now, late_sum), ideal, noise):
-        return SUM_LATE
-    if right or samples == 1:
-        return None if right else _by_size(products)
-    if _alike(now, _reversed(turned, samples, now), noise):
-        return f"{REVERSED}; {ABSENT}"
-    if any(_alike(now, _reversed(_plus(*each), samples, now), noise) for each in _ideals(samples)):
-        return REVERSED
-    return _by_size(products)
+            yield said, base, {pair: factor * c for pair, c in ideal.items()}
+        for shifted in _delayed(ideal, samples):
+            yield LATE, base, shifted
+    # Else those from before a call are too small to tell.
+    if not right and not any(_alike(_less(now, base), ideal, noise) for ideal, base in ideals):
+        for ideal, base in ideals:
+            for turned in _earlier_reversed(ideal):
+                yield EARLIER_REVERSED, base, turned
+    if samples > 1:
+        ideal, turned = _one_by_one(samples)
+        yield SUM_LATE, {pair: c for pair, c in turned.items() if pair[1] - pair[0] > 1}, ideal
+        if not right:
+            yield f"{REVERSED}; {ABSENT}", {}, _reversed(turned, samples, now)
+            for each in ideals:
+                yield REVERSED, {}, _reversed(_plus(*each), samples, now)
+
+
+def _fits(products: Products, base: Table, table: Table) -> bool:
+    """Return whether the coefficients are those of a correction beside the products that it is added to."""
+    correction = _less(products.at_once, base)
+    return _alike(correction, table, products.noise) if table else not _any(correction)
+
+
+def confidence(products: Products, said: str) -> tuple[float, str] | None:
+    """Return how sure a cause is, from 0 to 1, and what explains the coefficients next best.
+
+    It is 1 less the ratio of what the cause leaves of the coefficients to what the next best one leaves. None if the
+    cause is not one of these.
+
+    >>> table = {(-3, 0): 0.0, (-2, 0): 0.0, (-1, 0): -0.09}
+    >>> value, other = confidence(Products(1, table, table), WRONG_SIGN)
+    >>> round(value, 3), other
+    (0.926, 'correction absent or zero')
+    """
+    if weights_off(products) or _uneven(products) is not None or comes_late(products):
+        return None
+    left: dict[str, float] = {}
+    ideals = [(RIGHT, base, ideal) for ideal, base in _ideals(products.samples)]
+    for words, base, table in [*_faults(products), *ideals]:
+        rest = _size(_plus(products.at_once, {pair: -c for pair, c in _plus(base, table).items()}))
+        left[words] = min(left.get(words, math.inf), rest)
+    if said == _by_size(products):
+        left[said] = min(_scaled_rest(products, base, ideal) for _, base, ideal in ideals)
+    if said not in left:
+        return None
+    best = max(left.pop(said), products.noise)
+    other = min(left, key=lambda words: left[words])
+    return max(0.0, 1.0 - best / left[other]) if left[other] else 0.0, other
+
+
+def _scaled_rest(products: Products, base: Table, ideal: Table) -> float:
+    """Return what the multiple of a correction leaves that fits best."""
+    correction = _less(products.at_once, base)
+    visible = {pair: ideal.get(pair, 0.0) for pair in correction}
+    size = _size(visible) ** 2
+    factor = sum(c * visible[pair] for pair, c in correction.items()) / size if size else 0.0
+    return _size({pair: c - factor * visible[pair] for pair, c in correction.items()})
 
 
 def _by_size(products: Products) -> str:
@@ -225,18 +278,23 @@ def _bases(now: Table, samples: int) -> list[Table]:
 
 def _ideals(samples: int) -> Iterator[tuple[Table, Table]]:
     """Yield corrections that are right, by their coefficients, each with the products that it is added to."""
+    yield from ((ideal, base) for ideal, base, _ in _published(samples))
+
+
+def _published(samples: int) -> Iterator[tuple[Table, Table, Design]]:
+    """Yield the same with their designs."""
     for previous in range(MOST_PREVIOUS + 1):
         for form in FORMS:
-            coefficients = design(samples, previous, form).pairs
+            one = design(samples, previous, form)
             table = {
                 (older - previous, newer - previous): float(c)
-                for (older, newer), c in coefficients.items()
+                for (older, newer), c in one.pairs.items()
                 if newer >= previous
             }
             if any(table.values()):
-                yield table, {}
+                yield table, {}, one
     if samples > 1:
-        yield _one_by_one(samples)
+        yield *_one_by_one(samples), design(1, 1)
 
 
 def _one_by_one(samples: int) -> tuple[Table, Table]:
@@ -266,18 +324,6 @@ def _reversed(table: Table, samples: int, visible: Table) -> Table:
         if place in visible:
             seen[place] = value
     return seen
-
-
-def _is_earlier_reversed(now: Table, samples: int, noise: float) -> bool:
-    """Return whether coefficients are right if the samples before a call are in order from new to old."""
-    known = [(ideal, _less(now, base)) for ideal, base in _ideals(samples)]
-    if any(_alike(correction, ideal, noise) for ideal, correction in known):
-        return False  # those from before a call are too small to tell
-    return any(
-        _alike(correction, turned, noise)
-        for ideal, correction in known
-        for turned in _earlier_reversed(ideal)
-    )
 
 
 def _earlier_reversed(ideal: Table) -> Iterator[Table]:

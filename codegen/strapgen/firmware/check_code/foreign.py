@@ -138,6 +138,8 @@ class Segment:
     settled: bool = True
     #: (N, K, 3): velocity increments of the same samples in m/s; None for none
     velocities: Array | None = None
+    #: (N,): sampling interval in s that each call is told; None for that of the function
+    intervals: Array | None = None
 
 
 @dataclass(frozen=True)
@@ -307,30 +309,41 @@ class ForeignStep:
         """Number of calls that push all samples out of a memory."""
         return -(-REMEMBERED // self.samples)
 
+    def outputs(self, segments: Sequence[Segment], convention: Convention) -> tuple[ForeignRun, list[Array]]:
+        """Run segments one after the other in one process, and return the results of the calls of each as they are."""
+        rows = [self._rows(segment) for segment in segments]
+        arguments = self.source.arguments
+        scale = self.angle_unit if arguments.elements == 3 else 2.0**-self.state_bits
+        scales = np.where(np.arange(arguments.numbers) < arguments.elements, scale, 1.0)
+        done = self.calls(self._identity(convention) / scales, np.concatenate(rows))
+        done = replace(done, outputs=done.outputs * scales)
+        ends = np.cumsum([len(part) for part in rows])[:-1]
+        return done, [] if done.stopped else np.split(done.outputs, ends)
+
+    def _identity(self, convention: Convention) -> Array:
+        """Return the results before any call: no rotation, and no velocity."""
+        elements = self.source.arguments.elements
+        return np.concatenate(
+            [convention.identity(elements), np.zeros(self.source.arguments.numbers - elements)]
+        )
+
     def run(self, segments: Sequence[Segment], convention: Convention | None = None) -> ForeignRun:
         """Run segments one after the other in one process."""
         read = convention or self.convention
         arguments = self.source.arguments
-        rows = np.concatenate([self._rows(segment) for segment in segments])
         elements = arguments.elements
-        scale = self.angle_unit if elements == 3 else 2.0**-self.state_bits
-        scales = np.where(np.arange(arguments.numbers) < elements, scale, 1.0)
-        identity = np.concatenate([read.identity(elements), np.zeros(arguments.numbers - elements)])
-        done = self.calls(identity / scales, rows)
-        done = replace(done, outputs=done.outputs * scales)
+        identity = self._identity(read)
+        done, parts = self.outputs(segments, read)
         if not done.stopped and not np.abs(done.outputs).max() < _LARGEST:  # not finite: no number compares
             done = replace(
                 done, stopped="it leaves no finite numbers in its result, or does not write all of it"
             )
         if done.stopped:
             return done
-        runs, place = [], 0
-        for segment in segments:
+        runs = []
+        for segment, outputs in zip(segments, parts, strict=True):
             first = self.settling if segment.settled else 0
-            count = len(segment.increments)
-            outputs = done.outputs[place : place + first + count]
             before = outputs[first - 1] if first else identity
-            place += first + count
             whole = np.vstack([before, outputs[first:]])
             states = whole[:, :elements]
             matrices = read.matrices(states)
@@ -365,6 +378,9 @@ class ForeignStep:
         rows[:, 1] = float(self.interval)
         rows[:, 2] = float(self.interval * self.source.arguments.count)
         rows[:, 3:] = numbers
+        if segment.intervals is not None:
+            rows[len(quiet) :, 1] = segment.intervals
+            rows[len(quiet) :, 2] = segment.intervals * self.source.arguments.count
         return rows
 
     def _beside(self, segment: Segment, quiet: int) -> Iterator[Array]:

@@ -35,6 +35,8 @@ _LADDER, _FASTEST = (8, 16, 32, 64, 128), Fraction(6, 5)
 _LINEAR_ORDER = 2
 #: How much more than the worst of published steps a drift may be.
 DRIFT_WITHIN = 1.2
+#: Part of a drift about an axis that is none, and the factor of two that are the same.
+_NO_PART, _SAME = 1e-4, 1.001
 #: The same for errors at the longest step, which differ more with the start of the run.
 _ERROR_WITHIN = 2.0
 
@@ -193,12 +195,19 @@ def drift_on_cones(
         for (axis, turn), run in zip(CONES.items(), runs, strict=True)
     }
     axis = max(drifts, key=lambda axis: _size(drifts[axis]))
+    if _size(drifts[axis]) < _SAME * _size(drifts["y"]):
+        axis = "y"
     by_axis, size = drifts[axis], _size(drifts[axis])
     published, beside, closed = _published_drifts(step, standard, length, duration)
     best = min(published, key=lambda name: published[name])
     least = DRIFT_WITHIN * max(closed or 0.0, *published.values())
     rounding = math.degrees(4 * step.unit * float(duration / length)) / float(duration) * 3600
-    text = f"{size:.4g} deg/h{_across(by_axis, axis)}; {beside}{best} {published[best]:.4g}"
+    parts = ", ".join(f"{part:.4g}" if abs(part) > size * _NO_PART else "0" for part in by_axis)
+    text = (
+        f"{size:.4g} deg/h ({parts} about x, y, z) on a cone of {math.degrees(HALF_ANGLE):g} deg at "
+        f"{FREQUENCY / (2 * math.pi):g} Hz about {axis}, samples at {float(1 / SAMPLING):g} Hz; "
+        f"{beside}{best} {published[best]:.4g}"
+    )
     holds = size <= least + rounding
     if rounding > least / 100:
         text += f"; single precision hides {rounding:.3g}"
@@ -228,15 +237,6 @@ def _drift(step: ForeignStep, relative: Array, length: Fraction, duration: Fract
 
 def _size(drift: Array) -> float:
     return float(np.linalg.norm(drift))
-
-
-def _across(by_axis: Array, axis: str) -> str:
-    """Return the drift about another axis than that of the cone, if it is no small part."""
-    across = max((k for k in range(3) if "xyz"[k] != axis), key=lambda k: abs(by_axis[k]))
-    part = abs(by_axis[across])
-    if part <= _size(by_axis) / 4:
-        return ""
-    return f" on a cone about {axis}, {part:.4g} of it about {'xyz'[across]}"
 
 
 def samples_in_words(standard: Design) -> str:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from fractions import Fraction
+from functools import cache, partial
 from typing import Any
 
 import numpy as np
@@ -57,6 +58,34 @@ def evaluate(program: Program, values: Sequence[Any]) -> list[list[Any]]:
     names = [name for signal in program.inputs for name in signal.elements]
     results = program.run(dict(zip(names, values, strict=True)), ball, _operations())
     return [results[result.signal.name] for result in program.outputs]
+
+
+def scalar_function(program: Program) -> Callable[..., list[list[Any]]]:
+    """Return a program as a function of balls, one for each element of its inputs, at the precision of this call.
+
+    It returns the elements of each output; a call on single balls takes a fraction of the time of `evaluate`.
+    """
+    lines: list[str] = []
+    known: dict[str, Any] = dict(_functions())
+
+    def emit(text: str, *arguments: str) -> str:
+        lines.append(f"    t{len(lines)} = {text.format(*arguments)}")
+        return f"t{len(lines) - 1}"
+
+    def constant(value: Fraction) -> str:
+        known[f"c{len(known)}"] = ball(value)
+        return f"c{len(known) - 1}"
+
+    calls = {kind: f"{kind}({', '.join(['{}'] * _operands(kind))})" for kind in _functions()}
+    operations = {kind: partial(emit, text) for kind, text in (_SIGNS | calls).items()}
+    names = [name for signal in program.inputs for name in signal.elements]
+    inputs = [f"x{place}" for place in range(len(names))]
+    results = program.run(dict(zip(names, inputs, strict=True)), constant, operations)
+    returned = ", ".join(f"[{', '.join(results[one.signal.name])}]" for one in program.outputs)
+    code = "\n".join([f"def function({', '.join(inputs)}):", *lines, f"    return [{returned}]"])
+    exec(compile(code, f"<{program.kernel} on balls>", "exec"), known)
+    function: Callable[..., list[list[Any]]] = known["function"]
+    return function
 
 
 def product_in_pairs(product: Program, turns: Sequence[Any]) -> list[Any]:
@@ -125,8 +154,16 @@ def is_zero(value: Any) -> bool:
     return isinstance(value, int) and not value
 
 
-def _operations() -> dict[str, Callable[..., Any]]:
-    """Return the operations of programs on balls, and on arrays of them."""
+#: How operations are written whose operators balls have.
+_SIGNS = {
+    **{"add": "{} + {}", "subtract": "{} - {}", "multiply": "{} * {}", "divide": "{} / {}"},
+    "negate": "-{}",
+}
+
+
+@cache
+def _functions() -> dict[str, Callable[..., Any]]:
+    """Return the operations of programs on balls that have no operator."""
     from flint import arb
 
     def root(x: Any) -> Any:  # a radicand that exists is not negative, whatever its ball holds beside
@@ -144,25 +181,31 @@ def _operations() -> dict[str, Callable[..., Any]]:
             at_least(x, arb.pi()), x - 2 * arb.pi(), select(at_least(-x, arb.pi()), x + 2 * arb.pi(), x)
         )
 
-    functions: dict[str, tuple[Callable[..., Any], int]] = {
-        "sqrt": (root, 1),
-        "sin": (lambda x: x.sin(), 1),
-        "cos": (lambda x: x.cos(), 1),
-        "sinc": (lambda x: x.sinc(), 1),
-        "atan2": (lambda y, x: arb.atan2(y, x), 2),
-        "direction": (lambda y, x: arb.atan2(y, x), 2),
-        "wrap": (wrap, 1),
-        "maximum": (lambda x, y: x.max(y), 2),
-        "at_least": (at_least, 2),
-        "select": (select, 3),
+    return {
+        "sqrt": root,
+        "sin": lambda x: x.sin(),
+        "cos": lambda x: x.cos(),
+        "sinc": lambda x: x.sinc(),
+        "atan2": lambda y, x: arb.atan2(y, x),
+        "direction": lambda y, x: arb.atan2(y, x),
+        "wrap": wrap,
+        "maximum": lambda x, y: x.max(y),
+        "at_least": at_least,
+        "select": select,
     }
+
+
+def _operands(kind: str) -> int:
+    return _functions()[kind].__code__.co_argcount
+
+
+@cache
+def _operations() -> dict[str, Callable[..., Any]]:
+    """Return the operations of programs on balls, and on arrays of them."""
     exact = {
         "add": lambda x, y: y if is_zero(x) else x if is_zero(y) else x + y,
         "subtract": lambda x, y: -y if is_zero(x) else x if is_zero(y) else x - y,
         "multiply": lambda x, y: 0 if is_zero(x) or is_zero(y) else x * y,
     }
-    return {
-        **OPERATIONS,
-        **exact,
-        **{kind: np.frompyfunc(f, count, 1) for kind, (f, count) in functions.items()},
-    }
+    on_arrays = {kind: np.frompyfunc(f, _operands(kind), 1) for kind, f in _functions().items()}
+    return {**OPERATIONS, **exact, **on_arrays}

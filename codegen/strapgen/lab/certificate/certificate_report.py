@@ -34,8 +34,8 @@ class Angle(NamedTuple):
         vector = rotation_vector(matrix)
         if not all(x.is_finite() for x in vector):
             return cls((math.nan, math.nan, math.nan), math.inf, math.nan, math.inf)
-        (x, y, z), radii = zip(*map(_near, vector), strict=True)
-        return cls((x, y, z), max(radii), *_near(sum(x * x for x in vector).nonnegative_part().sqrt()))
+        (x, y, z), radii = zip(*map(near, vector), strict=True)
+        return cls((x, y, z), max(radii), *near(sum(x * x for x in vector).nonnegative_part().sqrt()))
 
     @property
     def above(self) -> float:
@@ -43,10 +43,10 @@ class Angle(NamedTuple):
         return math.nextafter(self.size + self.radius, math.inf)
 
 
-def _near(x: Any) -> tuple[float, float]:
+def near(x: Any) -> tuple[float, float]:
     """Return a double near a ball, and an upper end of its distance from the ball's numbers."""
-    near = float(x.mid())
-    return near, math.nextafter(float(abs(x - near).upper()), math.inf)
+    number = float(x.mid())
+    return number, math.nextafter(float(abs(x - number).upper()), math.inf)
 
 
 @dataclass(frozen=True)
@@ -63,6 +63,8 @@ class Departure(Record):
     header_bound_rad: float | None = field(metadata=entry("header, rad", ANGLE))
     #: Angle between the step in exact arithmetic and the exact rotation of the rate that it fits
     truncation_rad: float | None = field(metadata=entry("truncation, rad", ANGLE))
+    #: Angle that rounding has made in the attitude of now of a unit that commits late
+    now_rounding_rad: float | None = field(default=None, metadata=entry("now, rad", ANGLE))
 
 
 @dataclass(frozen=True)
@@ -117,6 +119,12 @@ class CertificateResult(Result):
     #: Intervals in which the state departs by more than rounding makes
     faults: Sequence[Fault]
     departures: Sequence[Departure]
+    #: Of a unit that commits late: the angle after the intervals of its start, and that in the attitude of now before
+    #: the last intervals are committed, with the radius of its ball, and the largest at any of the instants
+    start_rounding_rad: float | None = None
+    now_rounding_rad: float | None = None
+    now_rounding_radius_rad: float | None = None
+    largest_now_rounding_rad: float | None = None
     #: Where the increments come from
     source: str = field(default="", metadata=INTERNAL)
 
@@ -126,18 +134,24 @@ class CertificateResult(Result):
         header = "" if self.header_bound_rad is None else f" (header: {self.header_bound_rad:.2g})"
         lines = [
             f"{title} of {self.source}" if self.source else title,
-            f"rounding on this run: {self.rounding_rad:.3g} rad +- {_up(self.rounding_radius_rad)}{header}, about "
-            f"{_axes(self.rounding_axes_rad)}",
+            f"rounding on this run: {self.rounding_rad:.3g} rad +- {rounded_up(self.rounding_radius_rad)}{header}, "
+            f"about {_axes(self.rounding_axes_rad)}",
         ]
+        if self.now_rounding_rad is not None:
+            lines.append(
+                f"at its start: {self.start_rounding_rad:.3g} rad; in the attitude of now at the end: "
+                f"{self.now_rounding_rad:.3g} rad +- {rounded_up(self.now_rounding_radius_rad or 0.0)}, at most "
+                f"{self.largest_now_rounding_rad:.3g} rad"
+            )
         truncation = "not examined"
         if self.truncation_rad is not None:
-            truncation = f"{self.truncation_rad:.3g} rad +- {_up(self.truncation_radius_rad or 0.0)}"
+            truncation = f"{self.truncation_rad:.3g} rad +- {rounded_up(self.truncation_radius_rad or 0.0)}"
         lines.append(f"truncation of the step, beside the rate that it fits to its samples: {truncation}")
         if self.band_bound_rad is not None:
             lines.append(
                 f"if the rate lies below {self.band_hz:g} Hz with amplitudes of {self.amplitude_deg_s:g} deg/s in all: "
-                f"within {_up(self.band_bound_rad)} rad of the true attitude ({self.band_bound_status}), of sensors "
-                "without errors"
+                f"within {rounded_up(self.band_bound_rad)} rad of the true attitude ({self.band_bound_status}), of "
+                "sensors without errors"
             )
         lines += [
             f"a fault from {fault.from_s:.6g} s to {fault.to_s:.6g} s: the state departs by {fault.angle_rad:.3g} rad, "
@@ -147,7 +161,7 @@ class CertificateResult(Result):
         return "\n".join(lines)
 
 
-def _up(x: float) -> str:
+def rounded_up(x: float) -> str:
     """Return a bound in two digits, rounded up."""
     if not (x and math.isfinite(x)):
         return f"{x:g}"

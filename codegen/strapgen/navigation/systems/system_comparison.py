@@ -161,7 +161,7 @@ def agreement(
     if not isinstance(runner, CompiledSystem):
         raise InputError(f"back end {runner.backend} runs no C; the memory of every cycle is read from C")
     samples = runner.samples(inputs)
-    trace = runner.trace(samples, memory)
+    trace = runner.trace(samples, memory).cells
     limits = bounds(runner.fit)
     certified = {name: _added(limits.errors[name], _own(reference, name)) for name in limits.errors}
     largest = dict.fromkeys(trace, 0.0)

@@ -124,7 +124,7 @@ class SystemRunner:
                 if results & follows or wires - results - follows or any(w.external for w in stage.wires):
                     continue
                 for _ in range(2):
-                    self._call_stage(memory, stage, {})
+                    self.call_stage(memory, stage, {})
                 follows |= results
                 again = True
         for stage in self.system.stages:
@@ -246,6 +246,22 @@ class SystemRunner:
             name: np.concatenate(rows) if rows else empty[name] for name, rows in recorded.items()
         }, memory
 
+    def trace(self, samples: Mapping[str, Array], memory: SystemMemory | None = None) -> SystemMemory:
+        """Run checked samples cycle by cycle, and return a row of memory before the first cycle and after each.
+
+        Rows are in the numbers of the code. A stage that refuses its input is named.
+        """
+        after = (memory or self.begin()).copy()
+        rows = [after.copy()]
+        for k in range(len(next(iter(samples.values())))):
+            _, after = self._run({name: values[k : k + 1] for name, values in samples.items()}, 1, after)
+            rows.append(after.copy())
+        return SystemMemory(
+            {name: np.concatenate([row.cells[name] for row in rows]) for name in after.cells},
+            {name: np.concatenate([row.feedback[name] for row in rows]) for name in after.feedback},
+            after.cycle,
+        )
+
     def call(self, memory: SystemMemory, samples: Mapping[str, Array], rates: Sequence[Rate]) -> None:
         """Run some rates once on every row of a memory, each with its samples.
 
@@ -260,20 +276,24 @@ class SystemRunner:
         for rate in rates:
             for step in rate.steps:
                 if isinstance(step, Push):
-                    self._push(memory, step, samples)
+                    self.push(memory, step, samples)
                 else:
-                    self._call_stage(memory, step, samples)
-            for name in rate.cleared:
-                memory.cells[name] = np.zeros_like(memory.cells[name])
+                    self.call_stage(memory, step, samples)
+            self.clear(memory, rate)
 
-    def _push(self, memory: SystemMemory, push: Push, samples: Mapping[str, Array]) -> None:
+    def clear(self, memory: SystemMemory, rate: Rate) -> None:
+        """Set the cells to zero that a rate clears at its end."""
+        for name in rate.cleared:
+            memory.cells[name] = np.zeros_like(memory.cells[name])
+
+    def push(self, memory: SystemMemory, push: Push, samples: Mapping[str, Array]) -> None:
         """Add a sample to a cell that holds several."""
         new = samples[push.source] if push.external else memory.cells[push.source]
         new = self._moved(new, self.fit.arguments.get(push.source), self.fit.arguments.get(push.cell))
         held = memory.cells[push.cell]
         memory.cells[push.cell] = np.concatenate([held[:, new.shape[1] :], new], axis=1)
 
-    def _call_stage(self, memory: SystemMemory, stage: SystemStage, samples: Mapping[str, Array]) -> None:
+    def call_stage(self, memory: SystemMemory, stage: SystemStage, samples: Mapping[str, Array]) -> None:
         """Call a stage on every row."""
         evaluator, arguments = self.evaluators[stage.name], self.fit.arguments_of(stage)
         rows = []
@@ -411,13 +431,11 @@ class CompiledSystem(SystemRunner):
         }
         return values, self.memory(held)
 
-    def trace(self, samples: Mapping[str, Array], memory: SystemMemory | None = None) -> dict[str, Array]:
-        """Run checked samples cycle by cycle, and return every cell before the first cycle and after each.
-
-        Cells are (cycles + 1, elements), in the numbers of the C. A stage that refuses its input is named.
-        """
+    def trace(self, samples: Mapping[str, Array], memory: SystemMemory | None = None) -> SystemMemory:
+        """Run cycle by cycle in C, see `SystemRunner.trace`."""
         ffi = self.module.ffi
-        held = self.struct(memory or self.begin())
+        memory = memory or self.begin()
+        held = self.struct(memory)
         rows = [np.ascontiguousarray(samples[s.name], self._type(s.name)) for s in self.system.inputs]
         first = [ffi.from_buffer(array_type(array.dtype), array) for array in rows]
         sizes = [signal.size for signal in self.system.inputs]
@@ -429,16 +447,25 @@ class CompiledSystem(SystemRunner):
             if status:
                 raise self._refused(status, held, k)
             states += view
-        return self._cells_of(np.frombuffer(states, np.uint8).reshape(len(rows[0]) + 1, len(view)))
+        structs = np.frombuffer(states, np.uint8).reshape(len(rows[0]) + 1, len(view))
+        cells = {
+            cell.name: self._column(structs, cell.name, cell.signal.size, self._type(cell.name)).astype(
+                self._number(cell.name)
+            )
+            for cell in self.system.cells
+        }
+        feedback = {name: np.repeat(words, len(structs), axis=0) for name, words in memory.feedback.items()}
+        for name, words in feedback.items():
+            fixed = self.fit.sources[name].fixed
+            if fixed is not None and words.size:
+                kind = np.dtype(f"uint{fixed.settings.word}")
+                words[:] = self._column(structs, f"residuals_{name}", words.shape[1], kind)
+        return SystemMemory(cells, feedback, int(held.cycle))
 
-    def _cells_of(self, structs: Array) -> dict[str, Array]:
-        """Return the cells of many structs in memory, one a row of bytes."""
-        ffi, result = self.module.ffi, {}
-        for cell in self.system.cells:
-            place, kind = ffi.offsetof(f"{self.name}_memory", cell.name), self._type(cell.name)
-            columns = structs[:, place : place + kind.itemsize * cell.signal.size]
-            result[cell.name] = np.ascontiguousarray(columns).view(kind).astype(self._number(cell.name))
-        return result
+    def _column(self, structs: Array, name: str, size: int, kind: np.dtype[Any]) -> Array:
+        """Return a member of many structs in memory, one a row of bytes."""
+        place = self.module.ffi.offsetof(f"{self.name}_memory", name)
+        return np.ascontiguousarray(structs[:, place : place + kind.itemsize * size]).view(kind)
 
     def _refused(self, status: int, held: Any, done: int) -> InputError:
         """Return the error of a stage that has refused its input."""

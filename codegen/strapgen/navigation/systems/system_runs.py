@@ -55,17 +55,17 @@ def matrices(signal: Signal, values: Any) -> Array:
     rows = np.asarray(values, np.float64).reshape(-1, signal.size)
     if signal.size == 9:
         return rows.reshape(-1, 3, 3)
-    return np.asarray(evaluator(f"dcm-from-{_parameters(signal)}")(rows))
+    return np.asarray(evaluator(f"dcm-from-{parameters(signal)}")(rows))
 
 
-def _parameters(signal: Signal) -> str:
+def parameters(signal: Signal) -> str:
     """Return the kind of an attitude of four elements: the scalar is first in Cayley-Klein parameters."""
     return "cayley-klein" if signal.elements[0].endswith("_s") else "euler"
 
 
 def attitude_state(signal: Signal, matrix: Array) -> Array:
     """Return an attitude as a signal has it."""
-    return matrix if signal.size == 9 else np.asarray(evaluator(f"{_parameters(signal)}-from-dcm")(matrix))
+    return matrix if signal.size == 9 else np.asarray(evaluator(f"{parameters(signal)}-from-dcm")(matrix))
 
 
 def begun(runner: SystemRunner, start: Array | None) -> tuple[SystemMemory, Array]:

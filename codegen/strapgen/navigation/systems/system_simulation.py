@@ -1,8 +1,9 @@
-"""Described systems in the commands ``simulate``, ``compare`` and ``strapdown``."""
+"""Described systems in the commands ``simulate``, ``compare``, ``certify`` and ``strapdown``."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -282,14 +283,41 @@ def system_along(
     replace(output, format=format).show(SystemCourseResult(facts, course))
 
 
-def _simulate(*arguments: Any) -> None:
+def certified_system(
+    name: str,
+    others: list[str],
+    method: MethodOptions,
+    backend: str,
+    source: RecordingOptions,
+    intervals: RunOptions,
+    fixed: FixedOptions,
+    output: Output,
+) -> None:
+    """Certify the rounding of a described system along a recording, stage by stage.
 
-    simulated_system(*arguments)
+    The specific force is that of the recording, and zero where it has none.
+    """
+    refuse_options(method, fixed, others)
+    fixed.check_backend(backend)
+    output.check(name, source.file)
+    import numpy as np
+
+    from strapgen.cli.progress import waiting
+    from strapgen.navigation.systems.system_certificate import certify_system
+    from strapgen.navigation.systems.system_runs import begun, samples
+
+    data: Recording | None = None
+    with suppress(InputError):  # what is wrong with the gyro is said again
+        data = inertial(source, None)
+    data = whole_recording(source.load()) if data is None else data
+    runner = runner_of(described_along(name, data), backend, fixed)
+    angle = np.asarray(data.samples)
+    velocity = np.asarray(getattr(data, "velocity_increments", np.zeros_like(angle)))
+    memory, _ = begun(runner, intervals.start()) if intervals.initial is not None else (None, None)
+    source.say_remarks(data)
+    with waiting(f"certifying {name}"):
+        result = certify_system(runner, samples(runner.fit.description, angle, velocity), memory=memory)
+    output.show(replace(result, source=source.source))
 
 
-def _compare(*arguments: Any) -> None:
-
-    compared_system(*arguments)
-
-
-SYSTEMS = DescribedAlgorithms(is_system, _simulate, _compare)
+SYSTEMS = DescribedAlgorithms(is_system, simulated_system, compared_system, certified_system)
