@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING, Annotated, ClassVar
 
 import typer
 
+from strapgen import registration
 from strapgen.cli import terminal
-from strapgen.cli.option_groups import Shown, grouped, stated
+from strapgen.cli.option_groups import Shown, command_line, grouped, stated
 from strapgen.cli.options import STEP_OPTIONS, CheckedAlgorithm, MethodOptions, option
 from strapgen.cli.output import TEXT_OUTPUT, Output
 from strapgen.cli.values import Positive, Vector
@@ -169,6 +170,10 @@ class ForeignOptions:
         option("--keep-shim", metavar="FILE", help="Write the generated code that calls it to a file."),
     ] = None
 
+    report: Annotated[
+        Path | None, option("--report", metavar="FILE", help="Write the findings as one HTML page to a file.")
+    ] = None
+
     def read(self, file: str) -> ForeignSource | InterpretedSource:
         """Return the function of a file, and how it is called."""
         from strapgen.firmware.check_code.bridge import read_source
@@ -264,6 +269,7 @@ def check(
     Example: strapgen check examples/check_foreign_c/correct.c --function integrator_update
     --scalar first --init integrator_init
     """
+    _check_report(foreign.report, output, algorithm, *(foreign.source or ()), foreign.compile_commands)
     output.check(algorithm, *method.files, *(foreign.source or ()), foreign.compile_commands)
     from strapgen.firmware.check_code.foreign_arguments import FOREIGN_SUFFIXES, is_foreign
     from strapgen.firmware.check_code.interpreted import is_callable
@@ -278,6 +284,19 @@ def check(
             f"{algorithm} is none",
         )
         _check_step(algorithm, method, output)
+
+
+def _check_report(report: Path | None, output: Output, *read: str | Path | None) -> None:
+    """Check that the page is written over no file that is read or written, and that its folder can hold it."""
+    from strapgen.storage.files import check_folder
+
+    if report is None:
+        return
+    if report.resolve() in [Path(file).resolve() for file in read if file is not None]:
+        raise InputError(f"--report {report} is a file that the command reads; another one is needed")
+    if output.file is not None and report.resolve() == output.file.resolve():
+        raise InputError(f"--out and --report are both {report}; two files are needed")
+    check_folder(report.parent)
 
 
 def _refuse(options: Iterable[str], reason: str) -> None:
@@ -333,6 +352,14 @@ def _check_foreign(file: str, foreign: ForeignOptions, output: Output) -> None:
     from strapgen.firmware.check_code.check_foreign import check_foreign
 
     result = check_foreign(foreign.step(source))
+    if foreign.report is not None:
+        from strapgen.storage.files import write_files
+
+        page = registration.extension("check.report", "--report")
+        for path in write_files(
+            Path(), {str(foreign.report): page(result, command_line("check", file, foreign))}
+        ):
+            terminal.remark(f"wrote {path}")
     output.show(result)
     _fail(file, result.findings, f"; likely cause: {result.cause}" if result.cause else "")
 
