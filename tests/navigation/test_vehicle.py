@@ -13,13 +13,17 @@ from commands import run
 from strapgen.ir.exceptions import InputError
 from strapgen.lab.motions.motions import motion
 from strapgen.lab.motions.users_motions import any_motion, require_consistent
+from strapgen.lab.run_options import read_errors
 from strapgen.navigation.systems.system_flight import begun, fly
 from strapgen.navigation.systems.system_runner import system_runner
+from strapgen.navigation.systems.system_study import study
 from strapgen.navigation.systems.wiring import described
+from strapgen.navigation.vehicle.recorded_track import COLUMNS
 from strapgen.navigation.vehicle.vehicle_motion_names import TABLE
 from strapgen.navigation.vehicle.vehicle_motions import named
+from strapgen.run.backends import evaluator
 
-EXAMPLE = "examples/strapdown.toml"
+EXAMPLE, NAVIGATOR = "examples/strapdown.toml", "examples/navigator.toml"
 #: The ellipsoid and its gravity, typed from NIMA TR8350.2 for these tests alone.
 A, F, RATE, MU = 6378137.0, 1 / 298.257223563, 7.292115e-5, 3.986004418e14
 #: Coefficients of the first and second derivative at the middle of nine points, of eighth order.
@@ -220,6 +224,73 @@ def test_a_course_of_a_file_does_what_its_legs_say(tmp_path):
     assert 24.5 < np.degrees(roll.max()) <= 25.001
     assert pitch.max() > 0.09
     require_consistent(course, 60)
+
+
+@pytest.fixture
+def track(tmp_path):
+    """The file of a track, and the motion that it is of."""
+    course, times = motion("s-turns", speed_m_s=120, height_m=500), np.arange(0, 60.01, 0.2)
+    place = np.asarray(evaluator("geographic-angles")(course.position(times), np.zeros((len(times), 3))))
+    roll, pitch, heading = course.controls.angles(times)[0]
+    heading = np.mod(heading - place[:, 2], math.tau)
+    angles = np.degrees([*place[:, :2].T, roll, pitch, heading])
+    rows = np.column_stack([times + 17.5, *angles[:2], course.height(times), *angles[2:]])
+    file = tmp_path / "track.csv"
+    lines = [",".join(COLUMNS), *(",".join(map(repr, row)) for row in rows.tolist())]
+    file.write_text("\n".join(lines))
+    return file, course
+
+
+def test_a_recorded_track_is_the_motion_that_it_was_recorded_on(track):
+    file, course = track
+    again, times = any_motion(str(file), 1, {}), np.linspace(0, 60, 61)
+    # Splines of fifth degree on a period of 28 s, at 5 Hz; the ends are worst.
+    assert np.abs(again.velocity(times) - course.velocity(times)).max() < 1e-6
+    assert np.abs(again.position(times) - course.position(times)).max() * A < 1e-5
+    for one, other in zip(
+        *(one.both_samples(Fraction(1, 100), 0, 6000) for one in (again, course)), strict=True
+    ):
+        assert np.abs(one - other).max() < 1e-7
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("latitude_deg", "lat", "has no column latitude_deg; a track has time_s"),
+        ("18.1,", "17.1,", "time_s of row 4 is not after that of the row before"),
+        ("18.1,", "soon,", "row 4 is no row of numbers"),
+        ("18.1,", "nan,", "row 4 has a number that is not finite"),
+        ("17.5,45.0", "17.5,89.95", "comes within 0.1 deg of a pole"),
+    ],
+)
+def test_a_bad_track_gets_one_line(track, old, new, message, capsys):
+    file, _ = track
+    text = file.read_text()
+    assert text.count(old) == 1
+    file.write_text(text.replace(old, new))
+    run(["simulate", NAVIGATOR, "--motion", str(file), "--step", "0.01", "--duration", "1"], 2)
+    error = capsys.readouterr().err
+    assert message in error
+    assert error.count("\n") == 1
+
+
+def test_a_run_goes_to_the_end_of_the_track_at_most(track, capsys):
+    run(["simulate", NAVIGATOR, "--motion", str(track[0]), "--step", "0.01", "--duration", "61"], 2)
+    assert "the track lasts 60 s" in capsys.readouterr().err
+
+
+@pytest.mark.long
+def test_schuler_pumping_follows_its_closed_form():
+    """The printed example: v = 2b/ws [sin ws(t - t1) - sin ws(t - t2)], on an earth that turns beneath it."""
+    course = any_motion("examples/courses/schuler-pumping.toml", 1, {})
+    errors = read_errors("examples/sensors/accelerometer-bias.toml")
+    result = study(described(NAVIGATOR), course, Fraction(4800), [], errors=errors, align=True)
+    minutes = np.array([20, 30, 40, 50, 61, 80]) * 60
+    speed = result.sensors.sizes[1][minutes * 10 - 1]
+    closed = np.array([1.071455, 1.576113, 1.247011, -0.813211, -2.544471, -1.647334])
+    # The turns take 30 s, and gravity and radius are those of the ellipsoid: 1 % each.
+    assert np.allclose(speed, np.abs(closed), rtol=0.03)
+    assert math.isclose(result.sensors.sizes[1].max(), 2 * 1.581428927 * 0.8986, rel_tol=0.02)
 
 
 @pytest.mark.parametrize(

@@ -58,6 +58,7 @@ COMMANDS = {
         "system-comparison"
     ),
     "simulate examples/strapdown.toml --motion polar --step 0.01 --duration 1": "flight",
+    "study flight-errors examples/navigator.toml --errors ins-1 --duration 2 --sample-hz 50 --runs 10": "flight-errors",
     "study system examples/strapdown.toml --sample-hz 100 --duration 1 --backend c-float": "system-study",
     "strapdown euler --recording examples/inertial_log.csv --fast-cycles 4 --slow-cycles 50": "course",
     "redundancy examples/hexad.toml --out OUT": "redundant-sensors",

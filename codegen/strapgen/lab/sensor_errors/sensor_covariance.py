@@ -266,13 +266,13 @@ def _missing(path: Path, errors: InstrumentErrors) -> Array:
 def _of_constants(path: Path, errors: InstrumentErrors) -> Array:
     """Constants that every run draws: the square of what each of them does at its standard deviation."""
     total = np.zeros((path.records, 3, 3))
-    for one in _single(errors.gyro):
+    for one in single_constants(errors.gyro):
         effect = _effect(path, replace(errors, gyro=one, accelerometer=TriadErrors()))
         total += _outer(effect, effect)
     return total
 
 
-def _single(triad: TriadErrors) -> list[TriadErrors]:
+def single_constants(triad: TriadErrors) -> list[TriadErrors]:
     """Return the errors of each constant alone."""
     singles: list[TriadErrors] = []
 

@@ -15,7 +15,6 @@ from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError
 from strapgen.lab.motions.motions import Motion
 from strapgen.lab.runs_report import TIME_COLUMN, RunSettings, settings_text, table_of, thinned
-from strapgen.lab.sensor_errors.instruments import InstrumentErrors
 from strapgen.lab.sensor_errors.measured_motions import MeasuredMotion, both_increments
 from strapgen.lab.sensor_errors.sensors import MeasurementUnit, steady
 from strapgen.navigation.frame.frame_rates import HEIGHT, POSITION, VELOCITY
@@ -80,11 +79,12 @@ class NavigationCells:
 
 
 def begun(
-    runner: SystemRunner, motion: VehicleMotion, aligned_by: InstrumentErrors | None = None
+    runner: SystemRunner, motion: VehicleMotion, aligned_by: MeasuredMotion | None = None
 ) -> SystemMemory:
     """Return the memory of a system that begins on a motion: the truth, and all that follows from it.
 
-    `aligned_by`: steady errors of the sensors with which the system has found the vertical; its heading is true.
+    `aligned_by`: the motion as the sensors measure it with which the system has found the vertical; its heading is
+    true.
     """
     memory, cells = runner.begin(), NavigationCells.of(runner.system)
     attitude = motion.navigation_attitude(0.0)
@@ -101,14 +101,13 @@ def begun(
     return memory
 
 
-def aligned(motion: VehicleMotion, attitude: Array, errors: InstrumentErrors, interval: Fraction) -> Array:
-    """Return an attitude in whose axes the specific force that sensors measure first is vertical."""
-    unit = MeasurementUnit(steady(errors), float(interval))
-    _, velocity = unit(*motion.both_samples(interval, 0, 1))
-    sensed = attitude @ velocity[0]
-    return np.asarray(
-        _shortest((sensed / np.linalg.norm(sensed))[None], np.array([[0.0, 0, 1]]))[0] @ attitude
-    )
+def aligned(motion: VehicleMotion, attitude: Array, measured: MeasuredMotion, interval: Fraction) -> Array:
+    """Return an attitude in whose axes the specific force that sensors measure first is the true one."""
+    drawn = MeasurementUnit(measured.errors, float(interval), measured.run).errors
+    angle, velocity = motion.both_samples(interval, 0, 1)
+    _, sensed = MeasurementUnit(steady(drawn), float(interval))(angle, velocity)
+    there, here = (attitude @ one[0] / np.linalg.norm(one[0]) for one in (sensed, velocity))
+    return np.asarray(_shortest(there[None], here[None])[0] @ attitude)
 
 
 @dataclass(frozen=True)
@@ -171,8 +170,7 @@ def fly(
     thinning = every * (
         1 if record is None else checks.multiple("record", record, "cycle of the outputs", every * interval)
     )
-    errors = motion.errors if align and isinstance(motion, MeasuredMotion) else None
-    memory = begun(runner, true, errors)
+    memory = begun(runner, true, motion if align and isinstance(motion, MeasuredMotion) else None)
     angle, velocity = both_increments(motion, None, (0.0, 0.0, 0.0), interval, cycles)
     records: dict[str, list[Array]] = {cell.name: [] for cell in kinds}
     seen = dict.fromkeys(records, 0)
@@ -196,9 +194,7 @@ def _errors(
     """Return the errors of what a system computed at some times."""
     true, level = motion.position(time), motion.height(time)
     angles = np.asarray(evaluator("geographic-angles")(true, np.zeros((len(time), 3))))
-    sine, cosine = np.sin(angles[:, 1]), np.cos(angles[:, 1])
-    east, up = np.stack([-sine, cosine, 0 * sine], axis=-1), true[:, :, 2]
-    axes = np.stack([east, np.cross(up, east), up], axis=1)  # rows east, north, up in axes e
+    axes, up = local_axes(true), true[:, :, 2]
     there = position[:, :, 2] / np.linalg.norm(position[:, :, 2], axis=-1, keepdims=True)
     moved = _shortest(there, up) @ position
     turned = moved @ attitude @ np.swapaxes(true @ motion.navigation_attitude(time), 1, 2)
@@ -216,6 +212,14 @@ def _errors(
 
     track = np.column_stack([angles[:, :2], level])
     return Flight(time, local(vector), local(fast), local(far), track)
+
+
+def local_axes(position: Array) -> Array:
+    """Return the axes east, north and up in axes e of positions C_n^e, as rows, (N, 3, 3)."""
+    angles = np.asarray(evaluator("geographic-angles")(position, np.zeros((len(position), 3))))
+    sine, cosine = np.sin(angles[:, 1]), np.cos(angles[:, 1])
+    east, up = np.stack([-sine, cosine, 0 * sine], axis=-1), position[:, :, 2]
+    return np.stack([east, np.cross(up, east), up], axis=1)
 
 
 def _shortest(there: Array, here: Array) -> Array:

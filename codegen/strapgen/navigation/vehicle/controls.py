@@ -153,6 +153,16 @@ class Controls:
         return parts[0], parts[1]
 
     @property
+    def stands(self) -> bool:
+        """Whether the vehicle stays where it is."""
+        return self.speed == 0 and not self.accelerations
+
+    @property
+    def end(self) -> float:
+        """Time in s beyond which nothing is known."""
+        return math.inf
+
+    @property
     def edges(self) -> list[float]:
         """Times in s at which a third derivative jumps."""
         parts = (*self.accelerations, *self.climbs, *self.turns, *self.flat_turns)

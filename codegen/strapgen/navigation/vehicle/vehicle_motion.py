@@ -162,6 +162,20 @@ class VehicleMotion(Motion):
         acceleration = evaluator("coriolis-gravity")(velocity, gravity, earth, transport)
         return earth + transport, np.asarray(acceleration)
 
+    def frame_rates(self, time: Any) -> tuple[Array, Array]:
+        """Return the earth rate and the transport rate in axes n at some times, rad/s, (..., 3) each."""
+        times = np.asarray(time, float)
+        position = self.position(times)
+        velocity = self.controls.velocity(times)[0]
+        return self._call("earth-rate", position), self._transport(position, velocity, self.height(times))
+
+    def mean_radius(self, time: Any) -> Array:
+        """Return the radius of the earth at some times, that of Gauss, and the height, in m."""
+        square = self.earth.constants["eccentricity_squared"]
+        sine = self.position(time)[..., 2, 2]
+        radius = self.earth.radius * math.sqrt(1 - square) / (1 - square * sine**2)
+        return np.asarray(radius + self.height(time))
+
     def _transport(self, position: Array, velocity: Array, height: Array) -> Array:
         return self._call("wander-rate-ellipsoid", position, velocity, height)
 
@@ -187,7 +201,7 @@ class VehicleMotion(Motion):
     def position(self, time: Any) -> Array:
         """Return the position C_n^e at some times, (..., 3, 3)."""
         times = np.asarray(time, float)
-        if self.controls.speed == 0 and not self.controls.accelerations:
+        if self.controls.stands:
             return np.asarray(np.broadcast_to(self._begin, (*times.shape, 3, 3)))
         flat = times.ravel()
         result = np.empty((len(flat), 9))
@@ -202,7 +216,7 @@ class VehicleMotion(Motion):
         self._extend(sign, float(ages.max()))
         pieces = self._pieces[sign]
         ends = np.array(pieces.ends)
-        place = np.searchsorted(ends, ages, side="right")
+        place = np.minimum(np.searchsorted(ends, ages, side="right"), len(ends) - 1)
         starts = np.concatenate([[0.0], ends[:-1]])[place]
         off = ((ages - starts) / (ends[place] - starts))[:, None] - _PLACES
         exact = np.abs(off) < 1e-14
@@ -233,11 +247,12 @@ class VehicleMotion(Motion):
     def _extend(self, sign: float, last: float) -> None:
         """Integrate the position up to an age: P' = P [rho x], by collocation at the nodes of each piece."""
         pieces, edges = self._pieces[sign], self.controls.edges if sign > 0 else []
-        while not pieces.ends or pieces.ends[-1] <= last:
+        stop = self.controls.end
+        while not pieces.ends or (pieces.ends[-1] <= last and pieces.ends[-1] < stop):
             begin = pieces.ends[-1] if pieces.ends else 0.0
             state = pieces.nodes[-1][-1].reshape(3, 3) if pieces.ends else self._begin
             following = bisect_right(edges, begin + 1e-9)
-            end = begin + _PIECE
+            end = min(begin + _PIECE, stop)
             if following < len(edges):
                 end = min(end, edges[following])
             times = sign * (begin + (end - begin) * _PLACES)
@@ -268,6 +283,17 @@ class VehicleMotion(Motion):
         Gauss's rule integrates each cycle in parts that end at the edges of the controls, with enough nodes for the
         highest frequency of a vibration.
         """
+        asked = interval, first, stop
+        if asked not in self._sampled:
+            self._sampled.clear()  # runs on other sensors ask for the same samples again
+            self._sampled[asked] = self._both_samples(*asked)
+        return self._sampled[asked]
+
+    @cached_property
+    def _sampled(self) -> dict[tuple[Fraction, int, int], tuple[Array, Array]]:
+        return {}
+
+    def _both_samples(self, interval: Fraction, first: int, stop: int) -> tuple[Array, Array]:
         step = float(interval)
         if self.period and first == 0:
             once = round(self.period / step)
