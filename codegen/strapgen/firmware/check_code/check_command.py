@@ -177,7 +177,9 @@ class ForeignOptions:
     def read(self, file: str) -> ForeignSource | InterpretedSource:
         """Return the function of a file, and how it is called."""
         from strapgen.firmware.check_code.bridge import read_source
+        from strapgen.firmware.check_code.foreign_arguments import RUST
         from strapgen.firmware.check_code.interpreted import interpreted_source, is_callable
+        from strapgen.firmware.check_code.rust_source import rust_source
 
         if is_callable(file):
             return interpreted_source(
@@ -185,8 +187,9 @@ class ForeignOptions:
             )
         if self.function is None:
             raise InputError(f"{file} needs --function; --function NAME says which one is checked")
-        return read_source(
-            *(file, self.function, self.arguments, self.init or "", self.precision),
+        read = rust_source if Path(file).suffix == RUST else read_source
+        return read(
+            *(Path(file), self.function, self.arguments, self.init or "", self.precision),
             takes=self.input or "",
             is_angle_said=self.angle_unit is not None,
             cflags=self.cflags or "",
@@ -271,17 +274,17 @@ def check(
     """
     _check_report(foreign.report, output, algorithm, *(foreign.source or ()), foreign.compile_commands)
     output.check(algorithm, *method.files, *(foreign.source or ()), foreign.compile_commands)
-    from strapgen.firmware.check_code.foreign_arguments import FOREIGN_SUFFIXES, is_foreign
+    from strapgen.firmware.check_code.foreign_arguments import FOREIGN_SUFFIXES, RUST, is_foreign
     from strapgen.firmware.check_code.interpreted import is_callable
 
-    if is_foreign(algorithm) or is_callable(algorithm):
+    if is_foreign(algorithm) or is_callable(algorithm) or Path(algorithm).suffix == RUST:
         _refuse(stated(method), f"goes with an algorithm of strapgen; {algorithm} is code of your own")
         _check_foreign(algorithm, foreign, output)
     else:
         _refuse(
             stated(foreign),
-            f"goes with a file in C or C++ ({', '.join(FOREIGN_SUFFIXES)}), one in MATLAB or package.module:function; "
-            f"{algorithm} is none",
+            f"goes with a file in C or C++ ({', '.join(FOREIGN_SUFFIXES)}), one in Rust or MATLAB, or "
+            f"package.module:function; {algorithm} is none",
         )
         _check_step(algorithm, method, output)
 
