@@ -68,7 +68,7 @@ demo: $(READY)
 	@echo "docs/command-line.md shows all commands; docs/README.md answers questions."
 
 FIRMWARE := gcc-arm-none-eabi picolibc-arm-none-eabi qemu-system-arm gcc-riscv64-unknown-elf \
-  picolibc-riscv64-unknown-elf qemu-system-misc gcc-avr avr-libc clang cppcheck cmake
+  picolibc-riscv64-unknown-elf qemu-system-misc gcc-avr avr-libc arduino-core-avr clang cppcheck cmake
 
 EXAMINERS := frama-c-base gappa clang-tidy simavr valgrind qemu-user gcc-powerpc-linux-gnu \
   libc6-dev-powerpc-cross gcc-i686-linux-gnu libc6-dev-i386-cross afl++ libclang-rt-14-dev coq libcoq-flocq libcoq-gappa \

@@ -478,6 +478,14 @@ def test_a_function_of_several_meanings_is_told_by_its_parameters(tmp_path):
     assert [each.name for each in source.arguments.parameters] == ["self", "state", "rates", "dt"]
 
 
+@pytest.mark.needs("g++")
+def test_an_attitude_without_access_is_read_from_its_private_field(tmp_path):
+    text = "class A { public: void f(float gx, float gy, float gz, float dt); %s private: float q0, q1, q2, q3; };"
+    for public, wanted in (("", "self.q0 q1 q2 q3"), ("const float *data(); float quat[4];", "self.quat")):
+        (tmp_path / "a.hpp").write_text(text % public)
+        assert read_source(tmp_path / "a.hpp", "A::f").arguments.result.name == wanted
+
+
 # How it is compiled
 
 PLAIN = "void f(double q[4], const double gyro[3], double dt) { NUMBER x = gyro[0] * dt * helper(); q[0] += x; }\n"

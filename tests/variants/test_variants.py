@@ -136,6 +136,20 @@ def test_step_follows_from_sampling_rate_and_increments(folder):
     assert read(folder / "strapgen.toml")["attitude"].step == "1/100"
 
 
+def test_a_project_of_another_kind_is_held_in_step(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    text = TEXT.replace('"c-fixed", "numpy"', '"c-fixed"').replace("[16, 32]", "32")
+    (tmp_path / "strapgen.toml").write_text(
+        text.replace("increments = 2", 'increments = 2\nproject = "fmu3"')
+    )
+    run(["build"])
+    assert [path.name for path in (tmp_path / "firmware").iterdir()] == ["euler_rk4_2_w32.fmu3.fmu"]
+    run(["build", "--check"])
+    assert "1 step" in capsys.readouterr().out.splitlines()[-1]
+    (tmp_path / "firmware" / "euler_rk4_2_w32.fmu3.fmu").write_bytes(b"")
+    run(["build", "--check"], status=1)
+
+
 def test_pyproject_has_variants_below_tool_strapgen(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     text = TEXT.replace("[variant", "[tool.strapgen.variant")

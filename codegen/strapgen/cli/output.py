@@ -65,7 +65,7 @@ Project = Annotated[
     option(
         "--project",
         metavar="KIND",
-        help="In C: write a project of this kind that builds and tests it: cmake.  "
+        help="In C: write a project for a build: cmake, zephyr, esp-idf, platformio, arduino, python, fmu2 or fmu3.  "
         f"[without a value: {project_kinds.DEFAULT}]",
         panel="Output",
         read=project_kinds.read_kind,

@@ -351,7 +351,7 @@ def generate(
             )
         ),
     ],
-    output: Annotated[SourceOptions, Shown(only=("out", "name", "check", "force"))],
+    output: Annotated[SourceOptions, Shown(only=("out", "name", "project", "check", "force"))],
     format: Format = "text",
 ) -> None:
     """Generate C that commits an attitude late, and estimates the present one.
@@ -363,7 +363,7 @@ def generate(
     """
     check_format(format)
     sources = generated(window, algorithm, target, sample_hz, fixed, output.name)
-    files = sources.step_files
+    files = output.files(sources, "whole.project", sources)
     if output.check:
         difference = output.compare(files)
         typer.echo(difference, nl=False)

@@ -17,7 +17,7 @@ from strapgen.firmware.fmu import archive, units
 from strapgen.firmware.project import MotionRun, Project, two_speed_main
 from strapgen.firmware.project import refuse_changed as refuse_changed
 from strapgen.firmware.vectors import MODEL, SEED, ProgramEvaluator, vectors_of_choice
-from strapgen.firmware.vectors_c import CycleTable, cycle_files, table_files
+from strapgen.firmware.vectors_c import CycleTable, cycle_files
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.signals import Signal
@@ -53,10 +53,11 @@ def project_files(
     whole = two_speed_sources.sources(algorithm, sculling, target, settings)
     loops = two_speed_sources.loops(algorithm, sculling, target, settings)
     system = two_speed_sources.description(algorithm, sculling).system
-    tests = cycle_files(_cycle_table(whole, LoopSources(loops, system), command))
+    together = cycle_files(_cycle_table(whole, LoopSources(loops, system), command))
+    tables = []
     for loop in loops:
         stated = None if loop.fixed is None else loop.fixed.settings
-        tests |= table_files(vectors_of_choice(Choice(loop.kernel), target, stated, kinds()[kind].vectors))
+        tables.append(vectors_of_choice(Choice(loop.kernel), target, stated, kinds()[kind].vectors))
     conversions = [] if algorithm == "dcm" else [pipeline.compile(Choice(f"dcm-from-{algorithm}"), "c")]
     motion = project.motion_files(["coning-increments", "coning-truth"], conversions)
     step = _FAST_CYCLE * FAST
@@ -73,7 +74,7 @@ def project_files(
         SLOW,
     )
     main = two_speed_main(whole, loops, wiring(system, loops), command, run)
-    return Project(whole, command, main, tests, motion).files(kind)
+    return Project(whole, command, main, tables, together, motion).files(kind)
 
 
 def _cycle_table(whole: Sources, parts: LoopSources, command: str) -> CycleTable:

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import json
 from collections import Counter
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from fractions import Fraction
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -52,6 +53,7 @@ def environment(folder: Path | None = None) -> jinja2.Environment:
         run_paragraphs=run_paragraphs,
         residuals_text=contract.residuals_text,
         guards_text=contract.guards_text,
+        json=partial(json.dumps, ensure_ascii=False),
     )
     return shared
 

@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from strapgen.cli import generate_command, program
+from strapgen.cli.project_kinds import DEFAULT
 from strapgen.ir.exceptions import CompilerError, StrapgenError
 from strapgen.results.records import entry
 from strapgen.results.result import Result
@@ -72,12 +73,12 @@ def check(variant: Variant) -> Iterator[Step]:
         yield in_step
         if not _is_compiled(words):
             continue
-        name = _function(words)
-        if variant.checks.verify and in_step.holds:
+        name, plain = _function(words), _is_plain(variant)
+        if variant.checks.verify and in_step.holds and plain:
             yield _command(variant, ["verify", str(Path(_folder(variant)) / f"{name}.c")])
         if _has_own_vectors(variant):
             yield _same_vectors(variant, words)
-        if variant.checks.vectors or variant.options.get("project"):
+        if plain and (variant.checks.vectors or variant.options.get("project")):
             yield _run_vectors(variant, name)
         for limit in variant.checks.cost:
             yield _cost(variant, words, limit)
@@ -110,6 +111,11 @@ def _is_compiled(words: list[str]) -> bool:
 
 def _folder(variant: Variant) -> str:
     return str(words_of(variant.name, "generate", []).get("out", "."))
+
+
+def _is_plain(variant: Variant) -> bool:
+    """Return whether the C stands in the folder itself, as with one kind of project alone."""
+    return variant.options.get("project") in (None, False, True, DEFAULT)
 
 
 def _has_own_vectors(variant: Variant) -> bool:

@@ -36,7 +36,7 @@ _VECTORS = (
 )
 _SCALARS = {"g": "rates", "w": "rates", "p": "rates", "a": ZEROS, "m": ZEROS}
 _ATTITUDE = re.compile(
-    r"^(m_|_)?(get_?)?(q|q_?\d|q_?[bni]{2}|\w*quat\w*|att|attitude|state|orient\w*|rot|rotation_?matrix|dcm|matrix|"
+    r"^(m_|_)?(get_?)?((delta_?)?q|q_?\d|q_?[bni]{2}|\w*quat\w*|att|attitude|state|orient\w*|rot|rotation_?matrix|dcm|matrix|"
     r"[cr]_?[bni]?[bni]?|(q_?)?(out|new|next|result))_?$"
 )
 _ROTATIONS = re.compile(r"rot(ation)?_?vec\w*|^phi$|^rotation$|^rv$")
@@ -273,8 +273,10 @@ def _found(signature: Signature, reader: SourceReader) -> str:
     found = []
     for memory in memories:
         before, name = [declared(memory, reader)], variable(memory)
-        fields = [field for field in reader.fields(name, before) if _ATTITUDE.match(_last(field))]
-        found += [each.replace(name, memory.name) for each in _attitudes(reader, fields, before, "")]
+        fields = [each for each in reader.fields(name, before) if _ATTITUDE.match(_last(each[0]))]
+        public = _attitudes(reader, [field for field, is_public in fields if is_public], before, "")
+        every = public or _attitudes(reader, [field for field, _ in fields], before, "")
+        found += [each.replace(name, memory.name) for each in every]
     if not memories:
         names = [name for name in reader.variables() if _ATTITUDE.match(_last(name))]
         found = _attitudes(reader, names, [], "global ")

@@ -23,6 +23,7 @@ _SIZES = (1, 3, 4, 9)
 #: Options of a compiler that say what is read.
 _OPTIONS_READ = ("-I", "-D", "-U", "-std", "-isystem", "-iquote", "-include")
 _NUMBERS = {"FLOAT": "float", "DOUBLE": "double", "BOOL": "bool"}
+_HIDDEN = ("PRIVATE", "PROTECTED")
 _MOST_LEVELS = 3
 
 
@@ -145,20 +146,20 @@ class SourceReader:
     def signature(self, option: str, name: str) -> Signature:
         """Return the signature of a function."""
         full, cursor = self._cursor(option, name)
-        kinds = [argument.type for argument in cursor.get_arguments()]
-        names = [
-            argument.spelling or f"argument {k + 1}" for k, argument in enumerate(cursor.get_arguments())
+        types = [
+            (argument.spelling or f"argument {k}", _text(argument), argument.type)
+            for k, argument in enumerate(cursor.get_arguments(), 1)
         ]
-        result = cursor.result_type
+        count, result = len(types), cursor.result_type
         is_void = result.kind.name == "VOID"
-        values = self.values([*zip(names, kinds, strict=True), *([] if is_void else [("return", result)])])
+        values = self.values([*types, *([] if is_void else [("return", result.spelling, result)])])
         is_method = cursor.kind.name == "CXX_METHOD" and not cursor.is_static_method()
         owner = full.rpartition("::")[0] if is_method else ""
-        return Signature(full, tuple(values[: len(kinds)]), owner, None if is_void else values[-1])
+        return Signature(full, tuple(values[:count]), owner, None if is_void else values[-1])
 
-    def values(self, types: Sequence[tuple[str, Any]]) -> list[Value]:
-        """Return what variables of types of libclang are."""
-        plain = [_Declared.of(kind, self.file.is_cpp) for _, kind in types]
+    def values(self, types: Sequence[tuple[str, str, Any]]) -> list[Value]:
+        """Return what variables are, by their names, their declarations, and their types of libclang."""
+        plain = [_Declared.of(kind) for _, _, kind in types]
         lines = [
             f"extern {each.type} {'&' if self.file.is_cpp else ''}strapgen_{k};" if each.is_record else ""
             for k, each in enumerate(plain)
@@ -173,11 +174,10 @@ class SourceReader:
             [line for line in lines if line],
         )
         values = []
-        for k, ((name, kind), each) in enumerate(zip(types, plain, strict=True)):
+        for k, ((name, text, _), each) in enumerate(zip(types, plain, strict=True)):
             numbers = _numbers(known.get(f"strapgen_{k}") or each.kind, f"strapgen_{k}", known)
             shape = each.shape
             places = tuple(index + end for index in _indices(shape) for end in numbers.elements)
-            text = _declaration(kind.spelling, "" if name == "return" else name)
             values.append(
                 Value(
                     *(name, text, each.type, shape, each.passed, each.written),
@@ -219,7 +219,7 @@ class SourceReader:
         found = {}
         for place in places:
             if place in known:
-                each = _Declared.of(known[place], self.file.is_cpp)
+                each = _Declared.of(known[place])
                 numbers = _numbers(each.kind, place, known)
                 ends = tuple(index + end for index in _indices(each.shape) for end in numbers.elements)
                 found[place] = Value(
@@ -227,8 +227,8 @@ class SourceReader:
                 )
         return found
 
-    def fields(self, name: str, before: Sequence[str]) -> list[str]:
-        """Return the expressions of the fields of an object, and of its methods that take nothing."""
+    def fields(self, name: str, before: Sequence[str]) -> list[tuple[str, bool]]:
+        """Return fields of an object and its methods that take nothing, each with whether it is public."""
         kind = self.expressions([name], before).get(name)
         return [] if kind is None else [*_fields(kind, name, _MOST_LEVELS)]
 
@@ -253,24 +253,22 @@ class _Declared:
     open: bool
 
     @classmethod
-    def of(cls, kind: Any, is_cpp: bool) -> _Declared:
+    def of(cls, kind: Any) -> _Declared:
         """Return what a type is."""
-        written = address = open_ended = False
-        shape: list[int] = []
-        canonical = kind.get_canonical()
-        if canonical.kind.name in ("LVALUEREFERENCE", "RVALUEREFERENCE"):
-            kind, written = _pointee(kind), True
-        elif canonical.kind.name == "POINTER":
-            kind, written, address, open_ended = _pointee(kind), True, True, True
-        elif canonical.kind.name == "INCOMPLETEARRAY":
-            kind, written, address, open_ended = _element(kind), True, True, True
-        while kind.get_canonical().kind.name == "CONSTANTARRAY":
-            shape.append(kind.get_canonical().element_count)
-            kind, written = _element(kind), True
-        written = written and not kind.get_canonical().is_const_qualified()
-        spelled = kind.get_canonical().spelling if is_cpp else kind.spelling
-        name = re.sub(r"\b(const|volatile)\b *", "", spelled).strip()
-        return cls(kind.get_canonical(), name, tuple(shape), "&" if address else "", written, open_ended)
+        kind, shape = kind.get_canonical(), []
+        name = kind.kind.name
+        written = name in ("LVALUEREFERENCE", "RVALUEREFERENCE", "POINTER", "INCOMPLETEARRAY")
+        is_open = name in ("POINTER", "INCOMPLETEARRAY")
+        if written:
+            kind = kind.element_type if name == "INCOMPLETEARRAY" else kind.get_pointee()
+        is_const = (
+            re.match(r"(volatile )?const\b", kind.spelling) is not None
+        )  # of an array, of its elements too
+        while kind.kind.name == "CONSTANTARRAY":
+            shape.append(kind.element_count)
+            kind, written = kind.element_type, True
+        plain = re.sub(r"\b(const|volatile)\b *", "", kind.spelling).strip()
+        return cls(kind, plain, tuple(shape), "&" if is_open else "", written and not is_const, is_open)
 
     @property
     def is_record(self) -> bool:
@@ -284,22 +282,11 @@ class _Numbers:
     named: bool = False
 
 
-def _pointee(kind: Any) -> Any:
-    plain = kind.get_pointee()
-    return plain if plain.kind.name != "INVALID" else kind.get_canonical().get_pointee()
-
-
-def _element(kind: Any) -> Any:
-    plain = kind.element_type if kind.kind.name != "TYPEDEF" else kind.get_canonical().element_type
-    return plain if plain.kind.name != "INVALID" else kind.get_canonical().element_type
-
-
-def _declaration(spelled: str, name: str) -> str:
-    """Return a declaration as C has it."""
-    if "(" in spelled or "[" in spelled:
-        head, bracket, rest = spelled.partition("[")
-        return f"{head.rstrip()} {name}{bracket}{rest}" if "(" not in spelled else f"{spelled} {name}"
-    return f"{spelled}{'' if spelled.endswith(('*', '&')) else ' '}{name}".strip()
+def _text(cursor: Any) -> str:
+    """Return a declaration as the source has it, in one line."""
+    start, end = cursor.extent.start, cursor.extent.end
+    text = Path(start.file.name).read_bytes()[start.offset : end.offset].decode(errors="replace")
+    return " ".join(text.split())
 
 
 def _numbers(kind: Any, expression: str, known: dict[str, Any]) -> _Numbers:
@@ -322,7 +309,7 @@ def _numbers(kind: Any, expression: str, known: dict[str, Any]) -> _Numbers:
 def _of_fields(kind: Any, expression: str, known: dict[str, Any]) -> _Numbers | None:
     """Return the numbers of an object by its public fields."""
     fields = [each for each in kind.get_fields()]
-    if not fields or any(each.access_specifier.name in ("PRIVATE", "PROTECTED") for each in fields):
+    if not fields or any(each.access_specifier.name in _HIDDEN for each in fields):
         return None
     parts = [(each.spelling, _numbers(each.type, expression, known)) for each in fields]
     if kind.get_declaration().kind.name == "UNION_DECL":
@@ -405,20 +392,21 @@ def _variables(cursor: Any, scope: str) -> Iterator[tuple[str, Any]]:
             yield name, child
 
 
-def _fields(kind: Any, expression: str, levels: int) -> Iterator[str]:
-    """Yield the expressions of the fields of an object, and of its methods that take nothing."""
+def _fields(kind: Any, expression: str, levels: int, *, public: bool = True) -> Iterator[tuple[str, bool]]:
+    """Yield fields of an object and its methods that take nothing, each with whether it is public."""
     record = kind.get_canonical()
     if record.kind.name != "RECORD" or not levels:
         return
     for field in record.get_fields():
+        open_ = public and field.access_specifier.name not in _HIDDEN
         name = f"{expression}.{field.spelling}" if field.spelling else expression
-        if field.spelling and field.access_specifier.name not in ("PRIVATE", "PROTECTED"):
-            yield name
-        yield from _fields(field.type, name, levels - 1)
+        if field.spelling:
+            yield name, open_
+        yield from _fields(field.type, name, levels - 1, public=open_)
     for child in record.get_declaration().get_children():
         is_method = child.kind.name == "CXX_METHOD" and child.access_specifier.name == "PUBLIC"
         if is_method and not [*child.get_arguments()] and child.result_type.kind.name != "VOID":
-            yield f"{expression}.{child.spelling}()"
+            yield f"{expression}.{child.spelling}()", public
 
 
 def _of_system(cursor: Any) -> bool:

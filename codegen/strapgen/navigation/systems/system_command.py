@@ -39,7 +39,7 @@ def _a_drawing(option: str, path: Path) -> Path:
 
 @grouped
 @rules(
-    Needs("--with-runs --check --force", "--out"),
+    Needs("--with-runs --project --check --force", "--out"),
     Excludes("--check", "--draw", reason="--check writes nothing"),
 )
 def system(
@@ -91,7 +91,7 @@ def system(
     ],
     out: NewFolder = None,
     with_runs: WithRuns = False,
-    output: Annotated[SourceOptions, Shown(only=("check", "force"))],
+    output: Annotated[SourceOptions, Shown(only=("project", "check", "force"))],
     draw: Annotated[
         Path | None,
         option(
@@ -128,8 +128,9 @@ def system(
 
     errors = bounds(fit)
     sources = unit(fit, needs, errors, command)
-    files = sources.files if with_runs else sources.step_files
-    place = SourceOptions(out=out, check=output.check, force=output.force)
+    place = replace(output, out=out, with_runs=with_runs)
+    place.require_language(target)
+    files = place.files(sources, "whole.project", sources, fit)
     if output.check:
         place.show_difference(files, format)
         return
