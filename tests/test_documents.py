@@ -27,6 +27,7 @@ from strapgen.catalogue.kinematics import SAVAGE
 from strapgen.catalogue.methods.windows import named_window
 from strapgen.cli import app, main
 from strapgen.run import octave, standard_tree
+from strapgen.run.frameworks import FRAMEWORKS
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGES = sorted([*(ROOT / "docs").glob("*.md"), *(ROOT / "docs" / "paths").glob("*.md")])
@@ -319,7 +320,7 @@ LONG_PAGES = (
     [
         pytest.param(page, marks=pytest.mark.long if page in LONG_PAGES else ())
         for page, text in DOCS.items()
-        if ">>> " in text
+        if ">>> " in text and page != "frameworks"
     ],
 )
 def test_the_python_of_a_page(page, monkeypatch):
@@ -327,6 +328,17 @@ def test_the_python_of_a_page(page, monkeypatch):
     result = doctest.testfile(str(ROOT / "docs" / f"{page}.md"), module_relative=False)
     assert result.attempted >= 3
     assert result.failed == 0
+
+
+@pytest.mark.parametrize(
+    "section", DOCS["frameworks"].split("\n## ")[1:], ids=lambda text: text.split("\n")[0]
+)
+def test_the_python_of_a_framework(section):
+    (imported,) = {*FRAMEWORKS} & {*re.findall(r"\w+", re.findall(r">>> import (.*)", section)[0])}
+    pytest.importorskip(imported)
+    examples = doctest.DocTestParser().get_doctest(section, {}, imported, None, None)
+    assert len(examples.examples) >= 3
+    assert doctest.DocTestRunner().run(examples).failed == 0
 
 
 #: Commands that take a third of a second or more: many kernels, many terms, a compiler, or long runs.

@@ -79,6 +79,7 @@ SECTIONS = (
         "You bring a method, an algorithm, a motion or a language of your own.",
         (
             "docs/languages.md",
+            "docs/frameworks.md",
             "examples/toy_target/README.md",
             "docs/architecture.md",
             "CONTRIBUTING.md",

@@ -6,6 +6,7 @@ It is a list of single static assignments. The right side of each is a small tre
 
 from __future__ import annotations
 
+import importlib
 import itertools
 import math
 import operator
@@ -165,7 +166,7 @@ class _Instructions(NamedTuple):
     results: list[tuple[str, list[int]]]
 
 
-@renamed(companions="attitude_step", own="bundled_programs")
+@renamed(companions="attitude_step", own="bundled_programs", function="chosen_name")
 @dataclass(frozen=True)
 class Program:
     """Straight-line code for one kernel.
@@ -186,7 +187,7 @@ class Program:
         Kernels that a user's step brings.
     name : str
         Name in generated code; by default the identifier of the kernel.
-    function : str
+    chosen_name : str
         Name of the function in C if the user chooses it, with {} for the name that the target gives; "" for that name.
 
     Raises
@@ -209,7 +210,7 @@ class Program:
     transition: Result | None = None
     bundled_programs: tuple[Program, ...] = ()
     name: str = ""
-    function: str = ""
+    chosen_name: str = ""
 
     __repr__ = short_repr
     _repr_html_ = notebook_html
@@ -339,6 +340,41 @@ class Program:
         for slot, kind, arguments in code.operations:
             slots[slot] = operations[kind](*[slots[k] for k in arguments])
         return {name: [slots[k] for k in elements] for name, elements in code.results}
+
+    def function(self, framework: str) -> Any:
+        """Return the program as a function of another framework, in double precision.
+
+        Arguments and results are those of the generated C, in the same order. The operations are too, so that values
+        differ from it by rounding alone: where a framework fuses a product and a sum, and in sines and cosines.
+
+        Parameters
+        ----------
+        framework : str
+            "jax" and "torch" take and return arrays (..., shape), whose leading dimensions are broadcast; the function
+            can be differentiated and mapped, and compiled by ``jax.jit``. "casadi" returns a ``casadi.Function`` of SX,
+            with vectors as columns. "numba" returns one that ``numba.njit`` compiles, of one sample as arrays
+            (shape), float64. "sympy" returns one of matrices of exact expressions.
+
+        Returns
+        -------
+        callable
+            With a result, or a tuple of several. Derivatives by JAX, PyTorch and CasADi are finite at zero rotation.
+
+        Raises
+        ------
+        MissingExtraError
+            If the framework is not installed.
+        InputError
+            If it is not known, or JAX is set to 32 bits.
+
+        Examples
+        --------
+        >>> from strapgen import algorithm
+        >>> step = algorithm("euler", "rk1", increments=1).program().function("sympy")
+        >>> step([0, 0, 0, 1], [["x", 0, 0]]).T
+        Matrix([[x/2, 0, 0, 1]])
+        """
+        return importlib.import_module("strapgen.run.frameworks").function_of(self, framework)
 
     @once
     def _instructions(self) -> _Instructions:

@@ -65,6 +65,8 @@ def renamed(**names: str) -> Callable[[T], T]:
 
             changed.__init__ = init
         for old, new in names.items():
+            if old in vars(kind):  # a method has the old name
+                continue
 
             def read(self: Any, old: str = old, new: str = new) -> Any:
                 warn(f"{kind.__name__}.{old}", new)

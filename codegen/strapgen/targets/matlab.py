@@ -199,7 +199,7 @@ def file_name(program: Program) -> str:
     mostly a single word, so a kernel whose name is one gets another word behind it.
     """
     name = function_name(program)
-    if not program.function:
+    if not program.chosen_name:
         return name if "_" in name else f"{name}_Kernel"
     if not _allows(name):
         raise InputError(

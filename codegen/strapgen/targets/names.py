@@ -233,7 +233,7 @@ def can_be_chosen(name: str) -> bool:
 def function_name(program: Program, ending: str = "") -> str:
     """Return the name of a program's function in C: that chosen by the user, or else `external`."""
     default = external(program.name, ending)
-    return program.function.format(default) if program.function else default
+    return program.chosen_name.format(default) if program.chosen_name else default
 
 
 def printed(

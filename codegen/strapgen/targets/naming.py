@@ -58,7 +58,7 @@ class Naming:
             return program
         chosen = replace(
             program,
-            function=self._text if self.prefix is None else f"{self._text}{{}}",
+            chosen_name=self._text if self.prefix is None else f"{self._text}{{}}",
             info=replace(program.info, arguments=f"{program.arguments} {self.option} {self._text}"),
         )
         for ending in ("",) if self.prefix is None else ("", "_float", "_w32"):
