@@ -149,6 +149,13 @@ OUTPUTS = {
     "variation": _recipe("magnetic variation between four points", "outputs", "variation"),
     "magnetic-heading": _recipe("heading by the magnetic variation", "outputs", "magnetic_heading"),
     "track-angle": _recipe("direction of the ground velocity", "outputs", "track_angle"),
+    "drift-angle": _recipe("track angle less heading", "track_outputs", "drift_angle"),
+    "flight-path-angle": _recipe("angle of the velocity above level", "track_outputs", "flight_path_angle"),
+    "track-accelerations": _recipe(
+        "accelerations along and across the track", "track_outputs", "track_accelerations"
+    ),
+    "track-angle-rate": _recipe("rate of the track angle", "track_outputs", "track_angle_rate"),
+    "wind": _recipe("wind of ground velocity and airspeed", "track_outputs", "wind"),
     **{
         f"axes-{mounting}": _recipe(f"body axes of a unit that points {words}", "outputs", "axes", mounting)
         for mounting, words in MOUNTINGS.items()

@@ -51,9 +51,9 @@ _FRACTIONS = tuple(
     )
     for name, to in (("first_fraction", 2), ("second_fraction", 3))
 )
-_HEADING = Signal.scalar("heading", unit="rad", meaning="heading against true north", bound=_TURN)
+HEADING = Signal.scalar("heading", unit="rad", meaning="heading against true north", bound=_TURN)
 #: Up to 4096 knots, the range of the output.
-_GROUND_VELOCITY = Signal(
+GROUND_VELOCITY = Signal(
     "ground_velocity",
     (3,),
     ("north_velocity", "east_velocity", "down_velocity"),
@@ -134,7 +134,7 @@ def magnetic_heading() -> Kernel:
     Returns: inputs ``heading`` and ``variation`` in rad; output ``magnetic_heading`` in rad, -pi to pi.
     """
     build = KernelBuilder()
-    heading, difference = build.scalar(_HEADING), build.scalar(_VARIATION)
+    heading, difference = build.scalar(HEADING), build.scalar(_VARIATION)
     output = Signal.scalar("magnetic_heading", unit="rad", meaning="heading against magnetic north")
     build.output(output, [Wrapped(heading + difference)])
     return build.kernel(
@@ -152,7 +152,7 @@ def track_angle() -> Kernel:
     north over east, and ``ground_speed`` in m/s.
     """
     build = KernelBuilder()
-    north, east, _ = build.input(_GROUND_VELOCITY)
+    north, east, _ = build.input(GROUND_VELOCITY)
     build.output(
         Signal.scalar(
             "track_angle", unit="rad", meaning="direction of the ground velocity, from north over east"
