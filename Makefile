@@ -10,7 +10,7 @@ DOCS := .venv/.ready-for-docs
 
 .PHONY: help demo test test-lowest test-long mutants check bench generate clean \
   check-generated check-style check-layout check-types check-prose firmware-tools cost evidence evidence-page \
-  evidence-tools language-tools site-tools faults fuzz release-check docs docs-serve docs-check
+  evidence-tools language-tools estimation-tools site-tools faults fuzz release-check docs docs-serve docs-check
 
 help:
 	@echo "make demo      set up, then a short tour: formulas, their C, a table on every back end"
@@ -25,6 +25,7 @@ help:
 	@echo "make firmware-tools  on Debian: cross compilers, QEMU and CMake, for strapgen cost and tests"
 	@echo "make evidence-tools  on Debian: the tools above, Frama-C, Gappa, Coq, fuzzers and more processors, for make evidence"
 	@echo "make language-tools  on Debian: compilers of C++ and Rust, Eigen and Octave, for the tests of those languages"
+	@echo "make estimation-tools  on Debian: Ceres, and GTSAM from PyPI, for the tests of examples/estimation"
 	@echo "make site-tools  on Debian: Chromium and npm, for make docs and the tests of its pages"
 	@echo "make evidence  have independent tools examine the standard catalogue; hold generated/EVIDENCE.md to what they say"
 	@echo "make evidence-page  the same, and write generated/EVIDENCE.md anew"
@@ -85,6 +86,13 @@ evidence-tools: firmware-tools $(READY)
 language-tools:
 	apt-get update -qq
 	apt-get install -y -qq --no-install-recommends g++ rustc octave libeigen3-dev
+
+# Without a wheel of GTSAM for this Python its tests are skipped.
+estimation-tools: $(READY)
+	apt-get update -qq
+	apt-get install -y -qq --no-install-recommends g++ libceres-dev
+	$(BIN)/python -m pip install --disable-pip-version-check --only-binary gtsam -e '.[estimation]' \
+	  || echo "GTSAM cannot be installed; its tests are skipped" >&2
 
 # Node's own packages bring npm too.
 site-tools:

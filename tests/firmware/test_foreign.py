@@ -470,6 +470,13 @@ def test_the_page_of_the_examples_names_every_fault_as_the_command_does(check):
             "input 'angles' is not known; allowed: increments, rates, instants",
         ),
         ("euler --sample-hz 100", "--sample-hz goes with a file in C"),
+        ("euler --gravity-m-s2 0,0,9.8", "--gravity-m-s2 goes with a file in C"),
+        (
+            f"{PLACE}/correct.c {COMMAND} --gravity-m-s2 0,0,9.8",
+            "--gravity-m-s2 goes with a velocity behind the arrow",
+        ),
+        (f"{PLACE}/correct.c {COMMAND} --gravity-m-s2 9.8", "--gravity-m-s2 is .9.8.; three numbers"),
+        (f"{PLACE}/correct.c {COMMAND} --frame-rate-rad-s 0,0,a", "--frame-rate-rad-s .*a"),
         (
             f"{PLACE}/correct.c {COMMAND} --precision half",
             "precision 'half' is not known; allowed: double, float",

@@ -12,7 +12,7 @@ import pytest
 
 from strapgen.cli import main
 from strapgen.firmware.check_code import coning_causes as causes
-from strapgen.firmware.check_code.bridge import read_source
+from strapgen.firmware.check_code.bridge import bridge_text, read_source
 from strapgen.firmware.check_code.check_command import angle_unit
 from strapgen.firmware.check_code.foreign import (
     ForeignStep,
@@ -476,6 +476,18 @@ def test_a_function_of_several_meanings_is_told_by_its_parameters(tmp_path):
         read_source(tmp_path / "a.hpp", "A::f")
     source = read_source(tmp_path / "a.hpp", "A::f(double*, const double*, double)")
     assert [each.name for each in source.arguments.parameters] == ["self", "state", "rates", "dt"]
+
+
+@pytest.mark.needs("g++")
+def test_parameters_with_a_default_value_are_left_out(tmp_path):
+    (tmp_path / "a.hpp").write_text(
+        "void f(double *dcm, const double *gyro, double dt, int mode = 0, bool b = true);"
+    )
+    source = read_source(tmp_path / "a.hpp", "f")
+    assert in_words("f", source.arguments, "rates", "rad") == (
+        "f(dcm: state[9], gyro: rates[3] in rad/s, means, dt) -> state[9]"
+    )
+    assert "f(strapgen_of_dcm.of, strapgen_of_gyro.of, strapgen_of_dt.of);" in bridge_text(source)
 
 
 @pytest.mark.needs("g++")

@@ -173,6 +173,25 @@ def test_a_normalization_is_no_fault(algorithm):
     assert certify(replace(run, states=wrong), with_method=False).faults
 
 
+def test_what_an_orthonormalization_turns_is_no_rounding():
+    """In double it is what the scheme makes of the skew that truncation has left."""
+    samples = turns(240)
+    run = propagate(
+        backend(choose_step("dcm", "rk1", 2), backend="c"),
+        Recording(0.0, 0.01, samples),
+        orthonormalize="0.06",
+    )
+    whole = certify(run, with_method=False)
+    assert whole.rounding_rad < 1e-14
+    assert whole.orthonormalization_rad > 1e-9
+    assert "orthonormalization, beside it" in whole.text()
+    thinned = certify(replace(run, time=run.time[::40], states=run.states[::40]), with_method=False)
+    assert thinned.rounding_rad < 1e-14  # with several in a block
+    assert thinned.orthonormalization_rad == pytest.approx(whole.orthonormalization_rad, rel=0.1)
+    with pytest.raises(InputError, match="the states are not those"):  # more than rounding turns them
+        certify(replace(run, taken=replace(run.taken, orthonormalize_every=0)), with_method=False)
+
+
 def test_a_flipped_bit_is_found_with_its_time():
     run = run_of(choose_step("euler", "rk4", 2), every=1, carry="none")
     states = np.array(run.states)

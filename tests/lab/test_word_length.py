@@ -11,6 +11,7 @@ import pytest
 
 from strapgen.ir.exceptions import InputError
 from strapgen.lab import word_length
+from strapgen.lab.certificate import largest_rounding
 from strapgen.lab.motions import users_motions
 from strapgen.lab.word_length import cases, run, run_case
 from strapgen.lab.word_length_report import WordLengthResult, word_length_image
@@ -70,6 +71,27 @@ def test_the_file_of_a_motion_takes_the_place_of_its_parameters(tmp_path, monkey
         drifts.append(run_case(case).truncation_deg)
         WordLengthResult([run_case(case)]).text()
     assert drifts[0] == 0 < drifts[1], "another content of the file is another case"
+
+
+def test_what_the_arithmetic_adds_is_certified_below_the_rounding_of_a_double():
+    """A word of 50 bits with error feedback rounds less than a double: the other run was the coarser one."""
+    pytest.importorskip("flint")
+    (case,) = cases(duration="5", words=(50,), carries=("full",))
+    outcome = run_case(case)
+    assert 0 < outcome.rounding_radius_deg < 1e-9 * outcome.rounding_deg
+    assert outcome.rounding_deg <= outcome.bound_deg
+    (longer,) = cases(duration="5", words=(54,), carries=("full",))
+    assert run_case(longer).rounding_radius_deg is None  # a double does not hold its states
+
+
+def test_without_balls_the_run_in_double_is_compared(monkeypatch):
+    (case,) = cases(duration="5", words=(16,), carries=("full",))
+    certified = run_case(case)
+    for module in (word_length, largest_rounding):
+        monkeypatch.setattr(module, "has_balls", lambda: False)
+    compared = run_case(case)  # another key of the cache
+    assert compared.rounding_radius_deg is None
+    assert compared.rounding_deg == pytest.approx(certified.rounding_deg, rel=1e-3)
 
 
 def test_a_finished_case_is_not_run_again(outcomes, monkeypatch):

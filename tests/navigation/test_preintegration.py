@@ -1,6 +1,8 @@
 """Tests of preintegration: accuracy, Jacobians, covariance, instants, refusals, and the header in C++."""
 
 import subprocess
+import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -17,112 +19,14 @@ from strapgen.navigation.preintegration.preintegrator import (
     Preintegrator,
 )
 
-DEGREE = np.pi / 180
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "examples" / "estimation"))
 
+from rotations import exponential, logarithm, truth
+from simulated_imu import VEHICLES, motion, samples, stamps
 
-class Lines:
-    """A vector that is a constant and a sum of sines, with its exact integral."""
-
-    def __init__(self, constant, frequencies, cosines, sines):
-        self.constant, self.w = np.array(constant), 2 * np.pi * np.array(frequencies)
-        self.cosines, self.sines = np.array(cosines), np.array(sines)
-
-    def at(self, t):
-        phase = np.asarray(t)[..., None] * self.w
-        return self.constant + np.cos(phase) @ self.cosines + np.sin(phase) @ self.sines
-
-    def integral(self, t):
-        t = np.asarray(t)[..., None]
-        phase = t * self.w
-        return t * self.constant + np.sin(phase) / self.w @ self.cosines - np.cos(phase) / self.w @ self.sines
-
-
-def lines(rng, rms, highest, constant, vibration_hz, amplitude):
-    """Thirty lines of random phases, and a circle about z."""
-    phases = rng.uniform(0, 2 * np.pi, (30, 3))
-    size = rms * np.sqrt(2 / 30)
-    return Lines(
-        constant,
-        [*rng.uniform(0.2, highest, 30), vibration_hz],
-        [*(size * np.cos(phases)), [amplitude, 0, 0]],
-        [*(size * np.sin(phases)), [0, amplitude, 0]],
-    )
-
-
-def vehicle(hz, rate_rms, force_rms, highest, vibration_hz, rate, force):
-    rng = np.random.default_rng(5)
-    return (
-        hz,
-        lines(rng, rate_rms * DEGREE, highest, (0, 0, 0), vibration_hz, rate),
-        lines(rng, force_rms, highest, (0, 0, 9.8), vibration_hz, force),
-    )
-
-
-#: Sampling rate, body rate and specific force: the vibration has the amplitudes at which one kept sample has its errors
-#: in `KEPT`, rms of rotation, velocity and position.
-QUADCOPTER = vehicle(200, 150, 4, 8, 31, 0.43, 18)
-RACER = vehicle(500, 600, 15, 12, 78, 1.05, 43)
-CAR = vehicle(100, 20, 2, 5, 12, 0.38, 5)
-MOTIONS = {"quadcopter": QUADCOPTER, "racer": RACER, "car": CAR}
-
-
-def exponential(v):
-    angle = np.maximum(np.linalg.norm(v, axis=-1), 1e-12)[..., None, None]
-    x, y, z = np.moveaxis(v, -1, 0)
-    zero = np.zeros_like(x)
-    cross = np.moveaxis(np.array([[zero, -z, y], [z, zero, -x], [-y, x, zero]]), (0, 1), (-2, -1))
-    return np.eye(3) + np.sin(angle) / angle * cross + 2 * np.sin(angle / 2) ** 2 / angle**2 * cross @ cross
-
-
-def logarithm(r):
-    """Return the rotation vector of a small rotation."""
-    return np.stack([r[..., j, k] - r[..., k, j] for j, k in ((2, 1), (0, 2), (1, 0))], -1) / 2
-
-
-def truth(rate, force, begin, end, parts):
-    """Integrate by Magnus steps of sixth order, and velocity and position on the nodes of Gauss."""
-    h = ((end - begin) / parts)[:, None]
-    r, v, p = (
-        np.broadcast_to(np.eye(3), (len(begin), 3, 3)),
-        np.zeros((len(begin), 3)),
-        np.zeros((len(begin), 3)),
-    )
-    nodes, weights = np.polynomial.legendre.leggauss(4)
-    apart = np.sqrt(15) / 10
-
-    def turn(t, length):
-        first, middle, last = (rate.at(t + length[:, 0] * node) for node in (0.5 - apart, 0.5, 0.5 + apart))
-        a, b = length * middle, np.sqrt(15) / 3 * length * (last - first)
-        c = 10 / 3 * length * (last - 2 * middle + first)
-        ab = np.cross(b, a)  # body rates: products the other way round
-        inner = -20 * a - c - ab
-        return a + c / 12 + np.cross(b + np.cross(a, 2 * c - ab) / 60, inner) / 240
-
-    for k in range(parts):
-        t = begin + k * h[:, 0]
-        pushed, moved = np.zeros((2, len(begin), 3))
-        for node, weight in zip(0.5 + nodes / 2, weights / 2, strict=True):
-            part = exponential(turn(t, node * h)) @ force.at(t + node * h[:, 0])[..., None]
-            pushed, moved = pushed + weight * part[..., 0], moved + weight * (1 - node) * part[..., 0]
-        p = p + v * h + h**2 * (r @ moved[..., None])[..., 0]
-        v = v + h * (r @ pushed[..., None])[..., 0]
-        r = r @ exponential(turn(t, h))
-    return r, v, p
-
-
-def stamps(hz, number, jitter, seed=0):
-    noise = np.random.default_rng(seed).standard_normal(number) * jitter * 1e9 / hz
-    return np.arange(number) * (10**9 // hz) + np.round(noise).astype(np.int64)
-
-
-def samples(motion, at, kind="increments"):
-    """Return samples of rate and force with stamps, (N, 6)."""
-    _, rate, force = motion
-    t = at * 1e-9
-    if kind == "instants":
-        return np.hstack([rate.at(t), force.at(t)])
-    increments = np.diff(np.hstack([rate.integral(t), force.integral(t)]), axis=0, prepend=0)
-    return increments / np.diff(t, prepend=-1)[:, None] if kind == "rates" else increments
+#: One kept sample has its errors in `KEPT` there, rms of rotation, velocity and position.
+MOTIONS = {name: motion(name) for name in VEHICLES}
+QUADCOPTER = MOTIONS["quadcopter"]
 
 
 def pushed(window, motion, at, kind="increments", **noise):
@@ -315,6 +219,19 @@ def test_other_biases_need_no_second_pass():
     np.testing.assert_allclose(moved.velocity, again.velocity, atol=1e-5)
     np.testing.assert_allclose(moved.position, again.position, atol=1e-5)
     assert np.abs(unit.between(begin, end).velocity - again.velocity).max() > 1e-3
+
+
+def test_one_of_many_intervals_is_that_of_its_own():
+    at = stamps(200, 400, 0.01)
+    unit = pushed("pair-1-5", QUADCOPTER, at, rate_noise=1e-4)
+    biases = [1e-3, 0.0, 0.0], [0.0, 0.1, 0.0]
+    ends = at[[[30, 130], [200, 300]]].T
+    many, own = unit.between(*ends, *biases), unit.between(int(at[200]), int(at[300]), *biases)
+    for name in ("rotation", "velocity", "position", "covariance", "jacobian", "duration", "rate_bias"):
+        np.testing.assert_array_equal(getattr(many[1], name), getattr(own, name))
+    moved = many[1].at([0] * 3, [0] * 3)
+    np.testing.assert_allclose(moved.velocity, many.at([0] * 3, [0] * 3).velocity[1], rtol=1e-14)
+    assert many[:1].rotation.shape == (1, 3, 3)
 
 
 #: Noise of an ADIS16470, about.

@@ -13,6 +13,7 @@ import pytest
 from browser_checks import WIDTHS, opened
 from commands import run
 
+from strapgen import Settings, backend, compare
 from strapgen.catalogue import choose, standard
 from strapgen.cli import main
 from strapgen.evidence import collection
@@ -194,3 +195,19 @@ def test_every_kernel_of_the_catalogue_has_its_formulas_code_and_bounds():
         assert len(shown.formulas) and all(row.parts for row in shown.formulas)
         assert bool(shown.values) != bool(shown.no_fixed)
         assert len(shown.code) == (3 if shown.no_fixed else 4)
+
+
+def test_back_ends_are_certified_beside_exact_arithmetic(page):
+    """The run in 40 digits on the rounded increments agrees with balls; the page shows the radius."""
+    pytest.importorskip("flint")
+    choice, conditions = choose("euler"), Conditions(duration="1/2", sample_hz="50")
+    certified = dossier(choice, conditions, None, ("c", "c-fixed32")).runs.certified
+    schedule = conditions.schedule(choice)
+    samples = conditions.profile().increments(schedule.step, schedule.steps, choice.increments_per_step, 0, 0)
+    settings = Settings().for_increments(float(abs(samples).max()))
+    taken = backend(choice, backend="c-fixed32", settings=settings).representable(samples)
+    (row,) = compare(choice, backends=["c-fixed32"], samples=taken, reference="exact", settings=settings)
+    assert certified["c-fixed32"].angle == pytest.approx(row.max_abs_rad, rel=1e-6)
+    assert 0 < certified["c"].angle < 1e-14  # the angle between matrices in double is coarser
+    assert all(one.radius < 1e-9 * one.angle for one in certified.values())
+    assert page.read_text().count("<small>\u00b1 ") == 2

@@ -25,6 +25,7 @@ from strapgen.ir.exceptions import InputError
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.notebook_display import short_repr
 from strapgen.ir.renamed import renamed_parameters
+from strapgen.lab.certificate.largest_rounding import has_balls, largest_rounding
 from strapgen.lab.comparison import certified_angle
 from strapgen.lab.motions.motion_names import is_file
 from strapgen.lab.motions.motions import Motion
@@ -108,8 +109,8 @@ class Outcome(Record):
     drift_deg : float or None
         Drift from the truth; None if the run left the range of its format.
     rounding_deg : float or None
-        Effect of the arithmetic: the angle from the same algorithm in double on the same rounded increments; None if
-        the run left the range of its format.
+        Effect of the arithmetic: the angle from the same algorithm in exact arithmetic on the same rounded increments,
+        at up to some hundred instants; None if the run left the range of its format.
     quantization_deg : float
         Effect of rounded increments: the angle between the runs in double on rounded and on exact increments.
     truncation_deg : float
@@ -119,6 +120,9 @@ class Outcome(Record):
     expected_deg : float or None
         Root mean square of the angle that pulses cause at the end of the run, if the errors of the counted angles are
         independent; None without pulses. See `quantization_noise`.
+    rounding_radius_deg : float or None
+        Radius of the ball that holds `rounding_deg`, see `certify`; None where that is the angle from the run in double
+        at any step: without python-flint, in words of more than 53 bits, and from a quarter turn on.
 
     Examples
     --------
@@ -136,6 +140,7 @@ class Outcome(Record):
     truncation_deg: float
     bound_deg: float | None
     expected_deg: float | None = None
+    rounding_radius_deg: float | None = None
 
     __repr__ = short_repr
 
@@ -296,7 +301,8 @@ def run_case(case: Case) -> Outcome:
     True
     """
     motion = Path(case.motion).read_bytes() if is_file(case.motion) else b""
-    return cache.stored("studies", [json.dumps(asdict(case), sort_keys=True), motion], lambda: _run(case))
+    parts: list[str | bytes] = [json.dumps(asdict(case), sort_keys=True), motion, str(has_balls())]
+    return cache.stored("studies", parts, lambda: _run(case))
 
 
 def _run(case: Case) -> Outcome:
@@ -319,10 +325,13 @@ def _run(case: Case) -> Outcome:
     def largest(computed: Any, other: Any) -> float:
         return math.degrees(float(np.linalg.norm(drift_between(computed, other), axis=-1).max()))
 
-    drift = rounding = None
+    drift = rounding = radius = None
     try:
-        states = attitude(fixed, fixed.propagate(rounded))
-        drift, rounding = largest(states, truth), largest(states, same_attitude)
+        states = fixed.propagate(rounded)
+        computed = attitude(fixed, states)
+        drift, rounding = largest(computed, truth), largest(computed, same_attitude)
+        if (found := largest_rounding(fixed, states, rounded)) is not None:
+            rounding, radius = (math.degrees(value) for value in found)
     except InputError:  # in a short word without error feedback the state leaves its range
         pass
     bound = certified_angle(fixed, rounded, same)
@@ -334,6 +343,7 @@ def _run(case: Case) -> Outcome:
         largest(plain_attitude, truth),
         None if bound is None else math.degrees(bound),
         expected_noise(case, math.radians(pulse), _within(choice, exact)) if pulse else None,
+        radius,
     )
 
 

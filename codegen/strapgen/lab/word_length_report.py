@@ -19,13 +19,15 @@ _COLUMNS = (
     Column("carry", "<", least=7, gap=1),
     Column("drift", spec=ANGLE, least=8),
     Column("arithmetic", spec=ANGLE),
+    Column("+-", spec=".1e"),
     Column("certified", spec=ANGLE),
     Column("increments", spec=ANGLE),
     Column("most from", "<"),
 )
 _NOTES = (
     "all angles in deg, the largest along the run: lengths of the drift vector, where a mean drift adds up what is",
-    "largest on each axis; -: the state leaves its range, or no bound is known",
+    "largest on each axis; +-: radius in which the angle of the arithmetic is certain; -: the state leaves its range,",
+    "or no bound is known",
 )
 
 #: Which rounding errors each carry feeds back, in the words of the legend.
@@ -99,6 +101,7 @@ def _cells(outcome: Outcome) -> list[Any]:
         outcome.case.carry,
         outcome.drift_deg,
         outcome.rounding_deg,
+        outcome.rounding_radius_deg,
         outcome.bound_deg,
         outcome.quantization_deg,
         outcome.dominates,

@@ -23,13 +23,14 @@ from strapgen.ir.integer_program import FixedProgram
 from strapgen.ir.program import Program
 from strapgen.ir.sources import Sources
 from strapgen.kernel.kernel import Kernel
+from strapgen.lab.certificate.largest_rounding import LargestRounding, largest_rounding
 from strapgen.lab.comparison import Comparisons, compare
 from strapgen.lab.convergence import Convergence, LadderCase, measure_case
 from strapgen.lab.motions.motions import GENERAL, Motion
 from strapgen.lab.motions.users_motions import any_motion
 from strapgen.lab.parallel_cases import side_by_side
 from strapgen.lab.runs import Run, simulate
-from strapgen.run.backends import DEFAULT_BACKENDS, Backend, backend
+from strapgen.run.backends import BACKENDS, DEFAULT_BACKENDS, Backend, backend
 from strapgen.targets.registry import TARGETS
 from strapgen.thesis import thesis_tables
 from strapgen.thesis.thesis_tables import TableEntry
@@ -59,6 +60,8 @@ class StepRuns:
     run: Run
     #: Back ends beside exact arithmetic on the same increments
     comparison: Comparisons
+    #: What rounding has made of the attitude at most, by back end, where it is certified
+    certified: dict[str, LargestRounding]
     #: What back ends say whose numbers do not hold the run, by their names
     refused: dict[str, str]
     #: Those of back ends in fixed point
@@ -146,8 +149,9 @@ def _runs(
         )
         truth = profile.attitude(np.arange(1 + steps) * float(step))
         rows, refused = _compare(choice, backends, increments, truth, formats)
+        certified = _certified(choice, [row.backend for row in rows], increments, formats)
     ladder = measure_case(LadderCase(choice, "exact", "coning", GENERAL, LADDER, LADDER_DURATION))
-    return StepRuns(schedule, stepper, profile, run, rows, refused, formats, ladder)
+    return StepRuns(schedule, stepper, profile, run, rows, certified, refused, formats, ladder)
 
 
 def _compare(
@@ -175,6 +179,19 @@ def _compare(
             except InputError as error:
                 refused[name] = str(error)
         return held, refused
+
+
+def _certified(
+    choice: Choice, names: Sequence[str], increments: Array, settings: Settings
+) -> dict[str, LargestRounding]:
+    """Certify runs of back ends on increments that each rounds to its format, as `compare` does."""
+    fitted, found = settings.for_increments(float(np.abs(increments).max(initial=0.0))), {}
+    for name in names:
+        made = backend(choice, backend=name, settings=fitted if BACKENDS[name].fixed else None)
+        taken = made.representable(increments)
+        if (rounding := largest_rounding(made, made.propagate(taken), taken)) is not None:
+            found[name] = rounding
+    return found
 
 
 @dataclass(frozen=True)

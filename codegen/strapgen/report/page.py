@@ -13,6 +13,8 @@ import numpy as np
 
 from strapgen.design.frontier import DriftAndCost, pareto
 from strapgen.evidence.evidence_report import EvidencePage
+from strapgen.lab.certificate.certificate_report import rounded_up
+from strapgen.lab.certificate.largest_rounding import LargestRounding
 from strapgen.report.algorithm_view import (
     AlgorithmView,
     CommandResult,
@@ -203,7 +205,7 @@ class Content:
             _figure(ladder["predicted_order"]),
             _figure(ladder["observed_order"], ".3f"),
             _figure(drift),
-            *(_figure(rows.get(name, {}).get("max_abs_rad")) for name in self.backends),
+            *(_rounding(known.runs.certified.get(name), rows.get(name, {})) for name in self.backends),
         ]
 
     def kernel_rows(self) -> list[list[_PageCell]]:
@@ -312,6 +314,14 @@ def _costs(known: AlgorithmDossier) -> list[_PageCell]:
 def _figure(value: float | None, spec: str = _FIGURE) -> _PageCell:
     """Return a number as a cell; a dash for none."""
     return _PageCell("–") if value is None else _PageCell(format(value, spec), value)
+
+
+def _rounding(certified: LargestRounding | None, row: Mapping[str, Any]) -> _PageCell:
+    """Return what rounding has made of an attitude, with its radius; else the angle from the run in many digits."""
+    if certified is None:
+        return _figure(row.get("max_abs_rad"))
+    small = f"\u00b1 {rounded_up(certified.radius)}"
+    return _PageCell(format(certified.angle, _FIGURE), certified.angle, small=small)
 
 
 def _evidence_cell(evidence: Mapping[str, str]) -> _PageCell:

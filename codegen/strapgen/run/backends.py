@@ -362,6 +362,11 @@ class Backend:
         """
         return np.asarray(self.companion(self._need_orthonormalization())(state))
 
+    @property
+    def orthonormalization(self) -> str | None:
+        """The kernel that orthonormalizes a state; None where there is none."""
+        return self._orthonormalization
+
     def _need_orthonormalization(self) -> str:
         """Return the kernel that orthonormalizes, if there is one."""
         if self._orthonormalization is None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Generator, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from typing import ClassVar
 
@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from strapgen.firmware.check_code import coning_causes, ladder
 from strapgen.firmware.check_code.conformance import Finding, finding_text
+from strapgen.firmware.check_code.coning_causes import MeasuredCoefficient
 from strapgen.firmware.check_code.foreign import (
     ENDS,
     RATE_INPUTS,
@@ -42,8 +43,10 @@ from strapgen.firmware.check_code.probes import (
     sizes_in_words,
 )
 from strapgen.firmware.check_code.remedy import Remedy, remedy
-from strapgen.firmware.check_code.rotation import rotation, rotation_segments
+from strapgen.firmware.check_code.rotation import placement, rotation, rotation_segments
 from strapgen.firmware.check_code.upsets import upsets
+from strapgen.firmware.check_code.velocity import Velocity
+from strapgen.firmware.check_code.velocity_findings import MeasuredTranslation, VelocityFindings
 from strapgen.ir.renamed import renamed
 from strapgen.lab.motions.motions import motion
 from strapgen.results.records import INTERNAL, Properties, entry, properties
@@ -53,24 +56,20 @@ Array = NDArray[np.float64]
 
 #: Largest departure of C C' from the unit matrix that is no fault in itself.
 _NORM_WITHIN = 1e-4
+#: Largest error of the rate of a frame, by its size: a day of the sun or of the stars is 0.3 % apart.
+_FRAME_WITHIN = 0.005
 #: Units in the last place that rounding adds in a call.
 _UNITS_A_CALL = 64
 #: Largest component in rad of random increments.
 _RANDOM = 0.02
-#: Most coefficients that a line shows; those come first that differ most from what is wanted.
-_MOST_SHOWN = 4
 
 
-@dataclass(frozen=True)
-class MeasuredCoefficient:
-    """The coefficient of the cross product of two samples, older times newer."""
-
-    #: Samples of a call have the numbers from 0, those before it are negative
-    older: int
-    newer: int
-    #: That of the function, and that of the published correction whose pattern is nearest
-    seen: float
-    wanted: float
+FRAME_AT_START = (
+    "the rotation of the frame is turned to the body axes of the start of the call, not of its middle"
+)
+FRAME_AT_END = (
+    "the rotation of the frame is turned to the body axes of the end of the call, not of its middle"
+)
 
 
 @dataclass(frozen=True)
@@ -124,6 +123,10 @@ class ForeignResult(Result):
     replacement_command: str | None = None
     #: What its parameters are taken for
     reading: str = field(default="", metadata=INTERNAL)
+    #: Of a function that computes a velocity
+    translation: MeasuredTranslation | None = field(
+        default=None, metadata=entry(spread=True, optional=True, kind=MeasuredTranslation)
+    )
 
     @property
     def of_old_name(self) -> tuple[float, ...] | None:
@@ -175,6 +178,7 @@ class _Check:
         self.remedy: Remedy | None = None
         #: That of the function, once it is known
         self.convention: Convention | None = None
+        self.velocity = VelocityFindings(Velocity(step)) if step.source.arguments.translations else None
 
     def outcome(self) -> ForeignResult:
         """Run all checks."""
@@ -198,35 +202,45 @@ class _Check:
             self.remedy.code if self.remedy else None,
             self.remedy.command if self.remedy else None,
             self.step.reading,
+            None if self.velocity is None else self.velocity.measured,
         )
 
     def findings(self) -> Iterator[Finding]:
         """Yield the findings, up to a fault that hides all others."""
-        first = self.step.run(direction_segments(self.step))
-        calls = self.calls(first)
-        if calls.holds is False:
-            yield calls
-            return
-        convention, response = convention_of(self.step, directions(self.step, first.segments))
-        if convention is None:
-            yield calls
-            yield self.failed("axes", in_words(self.step, response.steady), off(response))
-            return
+        convention, response = self.step.convention, None
+        if self.step.source.arguments.elements:
+            first = self.step.run(direction_segments(self.step))
+            calls = self.calls(first)
+            if calls.holds is False:
+                yield calls
+                return
+            known, response = convention_of(self.step, directions(self.step, first.segments))
+            if known is None:
+                yield calls
+                yield self.failed("axes", in_words(self.step, response.steady), off(response))
+                return
+            convention = known
         everything = self.segments()
         done = self.step.run([segment for _, part in everything for segment in part], convention)
         calls = self.calls(done)
         yield calls
         if calls.holds is False:
             return
-        axes = [*self.axes(convention, response)]
-        yield from axes
-        if axes[-1].holds is False and off(response) <= SIZE_WITHIN:  # about reference axes
-            return
+        if response is not None:
+            axes = [*self.axes(convention, response)]
+            yield from axes
+            if axes[-1].holds is False and off(response) <= SIZE_WITHIN:  # about reference axes
+                return
         runs, place = {}, 0
         for name, part in everything:
             runs[name] = done.segments[place : place + len(part)]
             place += len(part)
-        yield from self.measured(convention, runs)
+        if response is not None:
+            runs = yield from self.measured(convention, runs)
+        if self.velocity is not None:
+            yield from self.velocity.findings(runs)
+            self.causes.extend(self.velocity.causes)
+        yield self.repeated(*runs["runs"])
 
     def upsets(self, found: Sequence[Finding]) -> Iterator[Finding]:
         """Yield the findings on input that fails and on long runs, once the function is known to work otherwise."""
@@ -282,8 +296,16 @@ class _Check:
         generator = np.random.default_rng(1969)
         size = min(_RANDOM, self.step.most / 2)  # of a component, half as large as a vector may be
         increments = generator.uniform(-size, size, (20, self.count, 3))
+        pushes = generator.uniform(-size, size, increments.shape)
         return [
-            ("runs", [Segment(increments, settled=False), Segment(increments, settled=False)]),
+            ("runs", [Segment(increments, settled=False, velocities=pushes)] * 2),
+            *([] if self.velocity is None else self.velocity.segments()),
+            *(self.of_attitude(increments) if self.step.source.arguments.elements else ()),
+        ]
+
+    def of_attitude(self, increments: Array) -> list[tuple[str, list[Segment]]]:
+        """Return the segments of the measurements of the attitude."""
+        return [
             ("at rest", rest_segments(self.step)),
             ("directions", direction_segments(self.step)),
             ("rotation", rotation_segments(self.step)),
@@ -293,16 +315,21 @@ class _Check:
             ("drift", ladder.drift_segments(self.step)),
         ]
 
-    def measured(self, convention: Convention, runs: dict[str, tuple[SegmentRun, ...]]) -> Iterator[Finding]:
-        """Yield the findings on all segments."""
+    def measured(
+        self, convention: Convention, runs: dict[str, tuple[SegmentRun, ...]]
+    ) -> Generator[Finding, None, dict[str, tuple[SegmentRun, ...]]]:
+        """Yield the findings on the attitude; return all runs as they would be in a resting frame."""
         self.convention = convention
         still = rest(self.step, runs["at rest"])
-        yield self.at_rest(still)
+        resting = self.at_rest(still)
+        yield resting
         runs = {name: tuple(run.in_resting_frame(still.frame) for run in part) for name, part in runs.items()}
         response = directions(self.step, runs["directions"])
         delay = self.delay(response)
         coefficients = None
         turned = rotation(self.step, convention, runs["rotation"])
+        if still.frame.any() and self.step.source.precision == "double":
+            yield self.frame_placement(still.frame, runs["rotation"])
         if self.step.takes != ENDS and delay.holds and off(response) <= SIZE_WITHIN:
             coefficients = products(self.step, runs["products"], exact=turned.order >= 3)
             if coning_causes.comes_late(coefficients):
@@ -315,14 +342,46 @@ class _Check:
         yield from self.corrected(coefficients, proved, runs)
         yield self.symmetry(*runs["symmetry"])
         yield self.norm(convention, runs["drift"][0])
-        yield self.repeated(*runs["runs"])
+        if self.velocity is not None:
+            self.velocity.frame = still.frame
+            self.velocity.frame_strays = bool(still.frame.any()) and resting.holds is False
+        return runs
 
     def at_rest(self, still: Rest) -> Finding:
         """Return the finding on a run without rotation."""
-        allowed = _UNITS_A_CALL * self.step.unit
+        allowed, seconds = _UNITS_A_CALL * self.step.unit, float(self.step.interval * self.count)
+        causes = still.causes(seconds)
+        if self.step.frame.any() and not still.strays:
+            return self.in_frame(still, -self.step.frame * seconds, causes)
+        self.causes.extend(causes)
         text = f"without rotation the state {'stays as it is' if still.moved <= allowed else 'moves'}"
-        self.causes.extend(still.causes(float(self.step.interval * self.count)))
         return Finding("at rest", still.moved <= allowed, text, still.moved, allowed)
+
+    def in_frame(self, still: Rest, wanted: Array, causes: list[str]) -> Finding:
+        """Return the finding on a run without rotation in a frame that moves, by a rotation vector in a call."""
+        size = float(np.linalg.norm(wanted))
+        allowed = _FRAME_WITHIN * size + 2 * self.step.unit
+        off = float(np.linalg.norm(still.frame - wanted))
+        if off <= allowed:
+            text = "without rotation the state turns as its frame does"
+            return Finding("at rest", True, text, off / size, allowed / size)
+        if np.linalg.norm(still.frame + wanted) <= allowed:
+            text = "the rate of the frame has the wrong sign"
+        elif np.linalg.norm(still.frame) <= allowed:
+            text = "the rate of the frame is absent"
+        else:
+            text = "the rate of the frame is another"
+        return self.failed("at rest", ": ".join([text, *causes[:1]]), off / size)
+
+    def frame_placement(self, frame: Array, runs: Sequence[SegmentRun]) -> Finding:
+        """Return the finding on where in a call the attitude turns with the frame."""
+        place = placement(self.step, frame, runs)
+        text = f"of the rotation of the frame {0.5 + place:.3g} is in the body axes of the end of the call; wanted 0.5"
+        holds = abs(place) <= DIRECTION_WITHIN
+        if not holds:
+            known = {-0.5: FRAME_AT_START, 0.5: FRAME_AT_END}
+            self.causes.append(known.get(round(2 * place, 1) / 2, text))
+        return Finding("frame placement", holds, text, place, DIRECTION_WITHIN)
 
     def delay(self, response: Directions) -> Finding:
         """Return the finding on the delay between samples and rotation."""
@@ -385,11 +444,7 @@ class _Check:
 
     def shown(self, known: Products) -> Finding:
         """Return the finding on the coefficients, and keep them beside those that are wanted."""
-        self.coefficients = tuple(
-            MeasuredCoefficient(older, newer, known.at_once[older, newer], value)
-            for (older, newer), value in coning_causes.wanted(known).items()
-            if value or abs(known.at_once[older, newer]) > coning_causes.LEAST
-        )
+        self.coefficients = coning_causes.measured(known)
         self.ratio = coning_causes.ratio(known)
         holds = coning_causes.corrects_coning(known) and not coning_causes.weights_off(known)
         if (said := coning_causes.cause(known)) is not None:
@@ -397,13 +452,7 @@ class _Check:
             self.sure = coning_causes.confidence(known, said)
         if not holds:
             self.remedy = remedy(coning_causes.nearest(known)[1])
-        by_difference = sorted(self.coefficients, key=lambda each: -abs(each.seen - each.wanted))
-        parts = [
-            f"d{each.older} x d{each.newer} {each.seen:.4g} ({each.wanted:.4g})"
-            for each in by_difference[:_MOST_SHOWN]
-        ]
-        rest = f" and {len(by_difference) - _MOST_SHOWN} more" if len(by_difference) > _MOST_SHOWN else ""
-        text = f"seen (wanted): {', '.join(parts)}{rest}; {self.ratio:.3f} of what coning needs"
+        text = f"{coning_causes.in_words(self.coefficients)}; {self.ratio:.3f} of what coning needs"
         return Finding("coefficients", holds, text, self.ratio, coning_causes.tolerance(known))
 
     def symmetry(self, plain: SegmentRun, turned: SegmentRun) -> Finding:
@@ -429,13 +478,22 @@ class _Check:
 
     def repeated(self, first: SegmentRun, second: SegmentRun) -> Finding:
         """Compare a run with the same run again, after a reset."""
-        off = float(np.abs(first.states - second.states).max())
+        off = max(
+            float(np.abs(one - other).max())
+            for one, other in zip(_numbers(first), _numbers(second), strict=True)
+            if one.size
+        )
         if off == 0:
             return Finding("runs", True, "a second run gives the same numbers", off, 0.0)
         self.causes.append(coning_causes.STATE_KEPT)
         init = self.step.source.init
         after = f"after {init}" if init else "no --init is named, and"
         return Finding("runs", False, f"{after} a second run differs from the first by {off:.3g}", off, 0.0)
+
+
+def _numbers(run: SegmentRun) -> list[Array]:
+    """Return all results of a run."""
+    return [run.states, *run.translations.values()]
 
 
 def _frame() -> Array:

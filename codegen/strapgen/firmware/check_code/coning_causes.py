@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from fractions import Fraction
 
 from strapgen.catalogue.methods.coning_coefficients import FORMS, Design, design
@@ -20,6 +21,8 @@ STATE_KEPT = "state kept between runs"
 #: What stands beside causes where the coefficients have none.
 RIGHT = "no fault of the coefficients"
 
+#: Most coefficients that a line shows; those come first that differ most from what is wanted.
+_MOST_SHOWN = 4
 #: Smallest coefficient that counts as one.
 LEAST = 0.001
 #: Largest departure from a known pattern of coefficients, by the largest of these.
@@ -32,6 +35,38 @@ _DENOMINATOR = 10**6
 _RATIO_WITHIN = 0.005
 #: The same for weights of samples.
 _WEIGHT_WITHIN = 0.01
+
+
+@dataclass(frozen=True)
+class MeasuredCoefficient:
+    """The coefficient of the cross product of two samples, older times newer."""
+
+    #: Samples of a call have the numbers from 0, those before it are negative
+    older: int
+    newer: int
+    #: That of the function, and that of the published correction whose pattern is nearest
+    seen: float
+    wanted: float
+
+
+def measured(products: Products) -> tuple[MeasuredCoefficient, ...]:
+    """Return the coefficients that are seen or wanted."""
+    return tuple(
+        MeasuredCoefficient(older, newer, products.at_once[older, newer], value)
+        for (older, newer), value in wanted(products).items()
+        if value or abs(products.at_once[older, newer]) > LEAST
+    )
+
+
+def in_words(coefficients: Sequence[MeasuredCoefficient], newer: str = "d") -> str:
+    """Return coefficients in words; `newer` is the letter of the second factor."""
+    by_difference = sorted(coefficients, key=lambda each: -abs(each.seen - each.wanted))
+    parts = [
+        f"d{each.older} x {newer}{each.newer} {each.seen:.4g} ({each.wanted:.4g})"
+        for each in by_difference[:_MOST_SHOWN]
+    ]
+    rest = f" and {len(by_difference) - _MOST_SHOWN} more" if len(by_difference) > _MOST_SHOWN else ""
+    return f"seen (wanted): {', '.join(parts)}{rest}"
 
 
 def standard_design(products: Products) -> Design:

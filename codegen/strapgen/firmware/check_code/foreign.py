@@ -221,6 +221,8 @@ class ForeignStep:
                 f"--input {self.takes} contradicts the argument rates; --input {RATES} or {ENDS} fits it"
             )
         arguments, source = self.source.arguments, self.source
+        if self.takes == ENDS and arguments.translations:
+            raise InputError(f"--input {ENDS} goes without a velocity behind the arrow of --arguments")
         if self.gravity is not None and VELOCITY not in arguments.meanings:
             raise InputError("--gravity-m-s2 goes with a velocity behind the arrow of --arguments")
         if self.frame_rate is not None and arguments.elements <= 3:

@@ -354,6 +354,10 @@ def _refuse_other_results(
                 f"--arguments: the result {name} stands behind the arrow alone; before it, it is needed too, or "
                 f"{_NEXT}{name}[3] behind it"
             )
+    if {VELOCITY, VELOCITY_CHANGE} <= {*meanings}:
+        raise InputError(
+            "--arguments: velocity and velocity_change are one result in two forms; one is allowed"
+        )
     if POSITION in known and POSITION not in meanings:
         raise InputError("--arguments: position stands before the arrow alone; behind it, it is needed too")
     for name, without in ((STATE, ()), (FRAME_RATE, (ROTATION,))):

@@ -24,7 +24,7 @@ Array = NDArray[np.float64]
 HALF_ANGLE, FREQUENCY, SAMPLING, SAMPLES = math.radians(1), 20 * math.pi, Fraction(1, 100), 6000
 #: Axes about which a cone turns, and what turns that of `cone`, which is nearly y, to each: an integrator without
 #: symmetry drifts differently on each.
-_CONES = {
+CONES = {
     "y": np.eye(3),
     "z": np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]]),
     "x": np.array([[0.0, 1, 0], [-1, 0, 0], [0, 0, 1]]),
@@ -34,7 +34,7 @@ _LADDER, _FASTEST = (8, 16, 32, 64, 128), Fraction(6, 5)
 #: Order of a linear rate between rates at instants.
 _LINEAR_ORDER = 2
 #: How much more than the worst of published steps a drift may be.
-_DRIFT_WITHIN = 1.2
+DRIFT_WITHIN = 1.2
 #: Part of a drift about an axis that is none, and the factor of two that are the same.
 _NO_PART, _SAME = 1e-4, 1.001
 #: The same for errors at the longest step, which differ more with the start of the run.
@@ -43,20 +43,21 @@ _ERROR_WITHIN = 2.0
 
 def ladder_segments(step: ForeignStep) -> list[Segment]:
     """Return the runs of the ladder, from the longest step to the shortest."""
-    return [_along(step, _general(), length, calls) for length, calls in _rungs(step)]
+    return [along(step, general_motion(), length, calls) for length, calls in rungs(step)]
 
 
 def drift_segments(step: ForeignStep) -> list[Segment]:
     """Return the runs on the cones."""
-    plain = _along(step, cone(), SAMPLING * step.samples, SAMPLES // step.samples)
-    return [Segment(plain.increments @ turn.T) for turn in _CONES.values()]
+    plain = along(step, cone(), SAMPLING * step.samples, SAMPLES // step.samples)
+    return [Segment(plain.increments @ turn.T) for turn in CONES.values()]
 
 
-def _general() -> Motion:
+def general_motion() -> Motion:
+    """Return the motion of the ladder."""
     return motion("coning", **GENERAL)
 
 
-def _rungs(step: ForeignStep) -> list[tuple[Fraction, int]]:
+def rungs(step: ForeignStep) -> list[tuple[Fraction, int]]:
     """Return step lengths in s of the motion, and the number of steps of each.
 
     The function is told the sampling interval all the same: the motion is as much faster or slower. At short intervals
@@ -66,7 +67,7 @@ def _rungs(step: ForeignStep) -> list[tuple[Fraction, int]]:
     return [(reach / count, count) for count in _LADDER]
 
 
-def _along(step: ForeignStep, profile: Motion, length: Fraction, calls: int) -> Segment:
+def along(step: ForeignStep, profile: Motion, length: Fraction, calls: int) -> Segment:
     """Return the samples of a motion, those of calls before it included."""
     count = step.settling + calls
     if step.takes != ENDS:
@@ -109,13 +110,13 @@ def linear_rates(segment: Segment) -> Array:
 
 def ladder(step: ForeignStep, runs: tuple[SegmentRun, ...], standard: Design) -> Convergence:
     """Return the errors of a function on the ladder, beside the order of theory."""
-    rungs = []
-    for (length, calls), run in zip(_rungs(step), runs, strict=True):
-        error = _error(step, run.relative, _general(), length)
+    errors = []
+    for (length, calls), run in zip(rungs(step), runs, strict=True):
+        error = _error(step, run.relative, general_motion(), length)
         floor = _floor(step, calls)
-        rungs.append((float(length), error, floor < error < MOST_ERROR))
+        errors.append((float(length), error, floor < error < MOST_ERROR))
     theory = pipeline.derive(published_step("coning-compressed", standard)).order
-    return fitted(step.source.function, step.source.precision, theory, rungs)
+    return fitted(step.source.function, step.source.precision, theory, errors)
 
 
 def _floor(step: ForeignStep, calls: int) -> float:
@@ -154,12 +155,12 @@ def order_in_float(
     It rests on what the probes have proved; beside it the error at the longest step is held to that of published
     steps, as far as rounding shows it.
     """
-    (length, calls), error = _rungs(step)[0], seen.rungs[0].error_rad
+    (length, calls), error = rungs(step)[0], seen.rungs[0].error_rad
     assert error is not None
     hidden = _floor(step, calls)
     if step.takes == ENDS:
         segment = ladder_segments(step)[0]
-        published, needed = _error(step, linear_rates(segment), _general(), length), _LINEAR_ORDER
+        published, needed = _error(step, linear_rates(segment), general_motion(), length), _LINEAR_ORDER
     else:
         published, needed = _published_error(step, standard, length, calls), seen.predicted or 0
     allowed = _ERROR_WITHIN * published + hidden
@@ -179,7 +180,7 @@ def _published_error(step: ForeignStep, standard: Design, length: Fraction, call
     errors = []
     for form in FORMS:
         published = attitude_backend(published_step(f"coning-{form}", standard))
-        run = simulate(published, _general(), between, length * calls)
+        run = simulate(published, general_motion(), between, length * calls)
         errors.append(float(np.linalg.norm(run.drift, axis=1).max()))
     return max(errors)
 
@@ -191,7 +192,7 @@ def drift_on_cones(
     length, duration = SAMPLING * step.samples, seconds(step.samples)
     drifts = {
         axis: turn @ _drift(step, turn.T @ run.relative @ turn, length, duration)
-        for (axis, turn), run in zip(_CONES.items(), runs, strict=True)
+        for (axis, turn), run in zip(CONES.items(), runs, strict=True)
     }
     axis = max(drifts, key=lambda axis: _size(drifts[axis]))
     if _size(drifts[axis]) < _SAME * _size(drifts["y"]):
@@ -199,7 +200,7 @@ def drift_on_cones(
     by_axis, size = drifts[axis], _size(drifts[axis])
     published, beside, closed = _published_drifts(step, standard, length, duration)
     best = min(published, key=lambda name: published[name])
-    least = _DRIFT_WITHIN * max(closed or 0.0, *published.values())
+    least = DRIFT_WITHIN * max(closed or 0.0, *published.values())
     rounding = math.degrees(4 * step.unit * float(duration / length)) / float(duration) * 3600
     parts = ", ".join(f"{part:.4g}" if abs(part) > size * _NO_PART else "0" for part in by_axis)
     text = (
@@ -225,7 +226,7 @@ def _published_drifts(
         linear = _drift(step, linear_rates(drift_segments(step)[0]), length, duration)
         return {"a linear rate between instants": _size(linear)}, "", None
     closed = abs(closed_form_deg_h(standard))
-    return generated_drifts(standard), f"closed form on {_samples(standard)} {closed:.4g}, ", closed
+    return generated_drifts(standard), f"closed form on {samples_in_words(standard)} {closed:.4g}, ", closed
 
 
 def _drift(step: ForeignStep, relative: Array, length: Fraction, duration: Fraction) -> Array:
@@ -238,7 +239,8 @@ def _size(drift: Array) -> float:
     return float(np.linalg.norm(drift))
 
 
-def _samples(standard: Design) -> str:
+def samples_in_words(standard: Design) -> str:
+    """Return the samples of a correction in words."""
     before = f" and {standard.previous} before" if standard.previous else ""
     return f"{standard.increments} sample{'s' if standard.increments > 1 else ''}{before}"
 

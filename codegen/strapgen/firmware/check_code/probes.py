@@ -44,13 +44,13 @@ _TURN = 0.001
 #: Size of an increment of a product in rad, by precision: its square is seen, its fourth power is not.
 _SMALL, _SMALL_COARSE = {"double": 0.002}, 0.02
 #: Calls without rotation after a probe, in which what comes late arrives.
-_LATE = 2
+LATE = 2
 #: Samples from before a call whose products with those of the call are looked at: one more, for a late correction.
-_BEFORE = MOST_PREVIOUS + 1
+BEFORE = MOST_PREVIOUS + 1
 #: Fewest calls of each of two large rotations, and their angle in rad.
 _CALLS, _LARGE = 20, 0.5
 #: The axes of an older and of a newer increment, the axis of their cross product, and its sign.
-_AXES = [(0, 1, 2, 1), (1, 0, 2, -1), (1, 2, 0, 1), (2, 1, 0, -1), (2, 0, 1, 1), (0, 2, 1, -1)]
+AXES = [(0, 1, 2, 1), (1, 0, 2, -1), (1, 2, 0, 1), (2, 1, 0, -1), (2, 0, 1, 1), (0, 2, 1, -1)]
 _SIGNS = list(product((1, -1), repeat=2))
 
 
@@ -129,21 +129,21 @@ class Products:
 
 def pairs(samples: int) -> list[tuple[int, int]]:
     """Return the pairs of samples whose products are looked at: the newer one is of the call."""
-    return [(older, newer) for newer in range(samples) for older in range(-_BEFORE, newer)]
+    return [(older, newer) for newer in range(samples) for older in range(-BEFORE, newer)]
 
 
-def _small(step: ForeignStep) -> float:
+def small_turn(step: ForeignStep) -> float:
     """Return the size of the increments of products in rad."""
     return min(_SMALL.get(step.source.precision, _SMALL_COARSE), step.most)
 
 
 def product_segments(step: ForeignStep) -> list[Segment]:
     """Return the segments that `products` needs."""
-    samples, small = step.samples, _small(step)
-    calls_before = -(-_BEFORE // samples)
+    samples, small = step.samples, small_turn(step)
+    calls_before = -(-BEFORE // samples)
     segments = []
-    for (older, newer), axes, signs in product(pairs(samples), _AXES, _SIGNS):
-        row = np.zeros(((calls_before + 1 + _LATE) * samples, 3))
+    for (older, newer), axes, signs in product(pairs(samples), AXES, _SIGNS):
+        row = np.zeros(((calls_before + 1 + LATE) * samples, 3))
         row[calls_before * samples + older, axes[0]] = signs[0] * small
         row[calls_before * samples + newer, axes[1]] = signs[1] * small
         segments.append(Segment(row.reshape(-1, samples, 3)))
@@ -152,19 +152,19 @@ def product_segments(step: ForeignStep) -> list[Segment]:
 
 def products(step: ForeignStep, runs: Sequence[SegmentRun], *, exact: bool) -> Products:
     """Return the coefficients of all products."""
-    samples, small = step.samples, _small(step)
+    samples, small = step.samples, small_turn(step)
     known = pairs(samples)
-    shape = (len(known), len(_AXES), len(_SIGNS))
+    shape = (len(known), len(AXES), len(_SIGNS))
     of_turns = _odd(_exact_turns(small))[0] / small**2
     tables = []
-    for call in (-(-_BEFORE // samples) + 1, -1):
+    for call in (-(-BEFORE // samples) + 1, -1):
         turns = rotation_vectors(np.array([run.relative[call] for run in runs])).reshape(*shape, 3)
         per_axis = _odd(turns) / small**2
         per_axis -= np.array([older < 0 for older, _ in known])[:, None] * of_turns
         tables.append(per_axis)
     signs = np.array(_SIGNS)[:, 1]
-    newer_axes = [axes[1] for axes in _AXES]
-    linear = (turns * signs[:, None]).mean(axis=2)[:, range(len(_AXES)), newer_axes].mean(axis=1) / small
+    newer_axes = [axes[1] for axes in AXES]
+    linear = (turns * signs[:, None]).mean(axis=2)[:, range(len(AXES)), newer_axes].mean(axis=1) / small
     weights = [
         float(linear[[newer == k for _, newer in known]].mean()) for k in range(samples)
     ]  # of the newer sample of a pair
@@ -179,7 +179,7 @@ def _odd(turns: Array) -> Array:
     weights = np.array([first * second for first, second in _SIGNS])
     odd = (turns * weights[:, None]).mean(axis=2)
     parts = np.zeros((len(odd), 3))
-    for number, (_, _, axis, sign) in enumerate(_AXES):
+    for number, (_, _, axis, sign) in enumerate(AXES):
         parts[:, axis] += sign * odd[:, number, axis] / 2
     return parts
 
@@ -187,13 +187,13 @@ def _odd(turns: Array) -> Array:
 def _exact_turns(small: float) -> Array:
     """Return the rotation vectors of exact products of rotations by two increments, (1, axes, signs, 3)."""
     update = evaluator("dcm-update")
-    vectors = np.zeros((2, len(_AXES), len(_SIGNS), 3))
-    for number, (older, newer, _, _) in enumerate(_AXES):
+    vectors = np.zeros((2, len(AXES), len(_SIGNS), 3))
+    for number, (older, newer, _, _) in enumerate(AXES):
         vectors[0, number, :, older] = small * np.array(_SIGNS)[:, 0]
         vectors[1, number, :, newer] = small * np.array(_SIGNS)[:, 1]
     first, second = vectors.reshape(2, -1, 3)
     turned = update(update(np.broadcast_to(np.eye(3), (len(first), 3, 3)), first), second)
-    return rotation_vectors(turned).reshape(1, len(_AXES), len(_SIGNS), 3)
+    return rotation_vectors(turned).reshape(1, len(AXES), len(_SIGNS), 3)
 
 
 #: Rotation below which a function does not turn at all, in units of the rotation.

@@ -39,6 +39,7 @@ _ATTITUDE = re.compile(
     r"^(m_|_)?(get_?)?((delta_?)?q|q_?\d|q_?[bni]{2}|\w*quat\w*|att|attitude|state|orient\w*|rot|rotation_?matrix|dcm|matrix|"
     r"[cr]_?[bni]?[bni]?|(q_?)?(out|new|next|result))_?$"
 )
+_MATRIX = re.compile(r"(m_|_)?(rot|dcm|matrix|[cr]_?[bni]?[bni]?_?$)")
 _ROTATIONS = re.compile(r"rot(ation)?_?vec\w*|^phi$|^rotation$|^rv$")
 _TIME = re.compile(
     r"^_?(dt|delta_?t(ime)?|d_?time|period|interval|(sample|time)_?(step|time|period|interval)|t_?s|h)_?(s|ms|us)?_?$"
@@ -58,7 +59,7 @@ def joined(signature: Signature, text: str, reader: SourceReader) -> ForeignArgu
     for argument in stated.parameters:
         if argument.name != MEMORY or not signature.owner:
             parameters.append(_carried(signature, argument, left))
-    if left:
+    if left and not left[0].has_default:
         raise InputError(
             f"--arguments {text!r} leaves out `{left[0].text}` of {signature.name}; what it is has to be said, "
             "a constant for instance as =0"
@@ -192,6 +193,8 @@ def proposed(signature: Signature, reader: SourceReader, takes: str, is_angle_sa
     while left:
         value = left.pop(0)
         role = _role(value, left)
+        if role == "" and value.has_default:
+            break
         if role == "":
             raise InputError(
                 f"{signature.name}: what `{value.text}` is, its name does not say; --arguments is needed, as "
@@ -216,7 +219,8 @@ def proposed(signature: Signature, reader: SourceReader, takes: str, is_angle_sa
             results.append(role)
         elif role in (NEXT, ROTATION):
             results.append(role)
-        words.append(role)
+        is_matrix = role in (STATE, NEXT) and value.open and _MATRIX.match(value.name.lower())
+        words.append(f"{role}[9]" if is_matrix and len(value.elements) == 1 else role)
     return f"{', '.join(words)} -> {results[0] if results else _found(signature, reader)}"
 
 

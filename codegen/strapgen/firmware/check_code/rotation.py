@@ -117,6 +117,22 @@ def rotation(step: ForeignStep, convention: Convention, runs: Sequence[SegmentRu
     return Rotation(square, cube, 2, "the rotation itself is of second order")
 
 
+def placement(step: ForeignStep, frame: Array, runs: Sequence[SegmentRun]) -> float:
+    """Return where in a call the attitude turns with a frame: -1/2 at its start, 1/2 at its end, 0 if exactly.
+
+    `frame` (3,): rotation vector of a call without rotation of the body, reference axes. `runs`: of the segments of
+    `rotation`, as they would be in a resting frame. What the product of the two rotations adds tells them apart.
+    """
+    small = len(_ATTITUDES) * 2 * len(_SMALL_ABOUT)
+    seen = size = 0.0
+    for run, vector in zip(runs[small:], _vectors(_LARGE_ABOUT, _large(step)), strict=True):
+        before = run.start @ run.relative[-2]
+        product_of_both = np.cross(before.T @ frame, vector)
+        seen += float(rotation_vectors(run.relative[-2].T @ run.relative[-1]) @ product_of_both)
+        size += float(product_of_both @ product_of_both)
+    return seen / size
+
+
 FIRST_ORDER = "the rotation itself is of first order"
 IN_PLACE = "of the result read in place of that of the argument (update in place)"
 

@@ -55,6 +55,11 @@ class Value:
         """Whether it is a struct, a union or a class."""
         return not self.elements or self.elements[0][:1] in (".", "(")
 
+    @property
+    def has_default(self) -> bool:
+        """Whether a call may leave it out."""
+        return "=" in self.text
+
     def holding(self, count: int) -> Value:
         """Return the same for so many numbers, where a pointer leaves their number open."""
         if not self.open or count == len(self.elements):

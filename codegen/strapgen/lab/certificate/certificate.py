@@ -27,7 +27,7 @@ from strapgen.lab.certificate import balls
 from strapgen.lab.certificate.balls import BITS
 from strapgen.lab.certificate.band_bound import BandBound
 from strapgen.lab.certificate.certificate_report import Angle, CertificateResult, Departure, Fault
-from strapgen.lab.certificate.exact_step import ExactStep
+from strapgen.lab.certificate.exact_step import ExactStep, Restoring
 from strapgen.lab.certificate.fitted_rotation import FittedRotation
 from strapgen.lab.parallel_cases import resume, side_by_side
 from strapgen.lab.recordings.recording import History
@@ -76,6 +76,8 @@ class Part:
     measured: Array | None  # before they were rounded to its format, where that changed them
     with_method: bool
     rate: Rate | None
+    first: int = 0  # steps of the run before these
+    restoring: Restoring | None = None
 
 
 def certify(
@@ -238,7 +240,11 @@ def _parts(
     row = taken.recording.samples
     if taken.pulse is not None:
         row = pulses(row[:, None], taken.pulse)[:, 0]
-    rounded = _as_taken(backend, row)
+    rounded, every = _as_taken(backend, row), taken.orthonormalize_every
+    kernel = backend.orthonormalization
+    # Parameters stay where they are, but for their length.
+    is_matrix = backend.attitude is None
+    restoring = Restoring(kernel, every) if is_matrix and every and kernel is not None else None
     same = np.array_equal(rounded, row)
     lengths, first, parts = np.diff(places), 0, {}
     while first < len(lengths):
@@ -255,6 +261,8 @@ def _parts(
             None if same else row[within],
             with_method,
             rate,
+            int(places[first]),
+            restoring,
         )
         first = last
     return parts
@@ -306,22 +314,23 @@ def _band_bound(choice: Choice, rate: Rate) -> BandBound:
 class _Block(NamedTuple):
     """What happened in a block of steps: rotations as matrices near 1, and the bound of what the band allows."""
 
-    rounding: Any  # from the exact algorithm to the states
+    rounding: Any  # from the exact algorithm, with its orthonormalizations, to the states
+    restoring: Any  # from the exact steps to these with exact orthonormalizations
     method: Any  # from the rotation of the fitted rate to the exact algorithm
     whole: Any  # from the rotation of the rate that is fitted to what was measured to the states
     band: float  # rad
 
     def written(self) -> list[Any]:
         """Return the block as plain JSON data, exactly."""
-        return [*(None if x is None else [*map(_text, x.entries())] for x in self[:3]), self.band]
+        return [*(None if x is None else [*map(_text, x.entries())] for x in self[:-1]), self.band]
 
     @classmethod
     def read(cls, row: Sequence[Any]) -> _Block:
         """Return the block from what `written` returns."""
         from flint import arb_mat
 
-        rounding, method, whole = (x and arb_mat(3, 3, [*map(_ball, x)]) for x in row[:3])
-        return cls(rounding, method, whole, row[3])
+        rounding, restoring, method, whole = (x and arb_mat(3, 3, [*map(_ball, x)]) for x in row[:-1])
+        return cls(rounding, restoring, method, whole, row[-1])
 
 
 def _text(x: Any) -> str:
@@ -366,8 +375,13 @@ def depart(part: Part) -> list[list[Any]]:
                 method = reached * (begun * fitted.matrix([column[k] for column in turns])).inv()
             if fitted is not None and true is not None and part.rate is not None:
                 whole = computed * (begun * fitted.matrix([column[k] for column in true])).inv()
-            band = float(bands[k]) if part.rate is not None else 0.0
-            rows.append(_Block(computed * reached.inv(), method, whole, band).written())
+            band, restored, restoring = float(bands[k]) if part.rate is not None else 0.0, reached, None
+            first, every = part.first + k * part.steps, part.restoring.every if part.restoring else 0
+            if part.restoring and first // every != (first + part.steps) // every:
+                block = samples[k * part.steps : (k + 1) * part.steps]
+                restored = step.matrix(step.restored(before, block, first, part.restoring))
+                restoring = restored * reached.inv()
+            rows.append(_Block(computed * restored.inv(), restoring, method, whole, band).written())
     return rows
 
 
@@ -418,7 +432,7 @@ def _joined(
         blocks = [_Block.read(row) for first in sorted(parts) for row in parts[first]]
     bound, with_method = _header_bound(run), blocks[0].method is not None
     one = _one()
-    rounding, method, whole, band = one, one, one, 0.0
+    rounding, restoring, method, whole, band = one, one, one, one, 0.0
     rows = [Departure(float(run.time[0]), 0, 0.0, 0.0, 0.0, 0.0 if with_method else None)]
     faults = []
     with ctx.workprec(BITS):
@@ -427,6 +441,7 @@ def _joined(
             if limit is not None and not alone.size - alone.radius <= limit:
                 faults.append(Fault(float(run.time[k]), float(run.time[k + 1]), alone.size, limit))
             rounding = block.rounding * rounding
+            restoring = restoring if block.restoring is None else block.restoring * restoring
             method = block.method * method if with_method else method
             whole, band = (block.whole * whole, band + block.band) if rate is not None else (whole, band)
             computed, steps = Angle.of(rounding), int(places[k + 1] - places[0])
@@ -448,6 +463,8 @@ def _joined(
         if rate is not None:
             within = math.nextafter((Angle.of(whole).above + band) * (1 + 1e-12), math.inf)
         matrix, shape = backend.attitude is None, _shape(rounding)
+        is_restored = any(block.restoring is not None for block in blocks)
+        turned = Angle.of(restoring).size if is_restored else None
     return CertificateResult(
         kernel=backend.kernel,
         backend=backend.name,
@@ -458,6 +475,7 @@ def _joined(
         rounding_axes_rad=computed.axes,
         largest_rounding_rad=max(row.rounding_rad for row in rows),
         header_bound_rad=rows[-1].header_bound_rad,
+        orthonormalization_rad=turned,
         truncation_rad=None if truncation is None else truncation.size,
         truncation_radius_rad=None if truncation is None else truncation.radius,
         truncation_axes_rad=None if truncation is None else truncation.axes,

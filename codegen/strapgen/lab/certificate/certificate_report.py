@@ -125,6 +125,9 @@ class CertificateResult(Result):
     now_rounding_rad: float | None = None
     now_rounding_radius_rad: float | None = None
     largest_now_rounding_rad: float | None = None
+    #: Angle by which exact orthonormalizations of the computed matrices turn them, which is no part of the rounding;
+    #: null for parameters, and without any
+    orthonormalization_rad: float | None = None
     #: Where the increments come from
     source: str = field(default="", metadata=INTERNAL)
 
@@ -143,6 +146,8 @@ class CertificateResult(Result):
                 f"{self.now_rounding_rad:.3g} rad +- {rounded_up(self.now_rounding_radius_rad or 0.0)}, at most "
                 f"{self.largest_now_rounding_rad:.3g} rad"
             )
+        if self.orthonormalization_rad is not None:
+            lines.append(f"orthonormalization, beside it: {self.orthonormalization_rad:.3g} rad")
         truncation = "not examined"
         if self.truncation_rad is not None:
             truncation = f"{self.truncation_rad:.3g} rad +- {rounded_up(self.truncation_radius_rad or 0.0)}"

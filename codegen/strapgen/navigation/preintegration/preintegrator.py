@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from dataclasses import dataclass, replace
 from enum import IntEnum
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +18,7 @@ from strapgen.ir.exceptions import InputError
 from strapgen.ir.notebook_display import Records, short_repr
 from strapgen.navigation.preintegration import INPUTS, resampling
 from strapgen.run.backends import evaluator
-from strapgen.run.evaluators import Array
+from strapgen.run.evaluators import Array, Evaluator
 
 #: A stamp is at most so many nominal intervals after the one before.
 LONGEST = 1.5
@@ -118,6 +120,11 @@ class Preintegrated(Records):
     def _in_words(self) -> str:
         return f"over {np.max(self.duration):g} s"
 
+    def __getitem__(self, place: Any) -> Preintegrated:
+        """Return one of many intervals, or several, by their place in the shape of the instants."""
+        parts = ("rotation", "velocity", "position", "covariance", "jacobian", "duration")
+        return replace(self, **{name: getattr(self, name)[place] for name in parts})
+
     def at(self, rate_bias: Any, force_bias: Any) -> Preintegrated:
         """Return rotation, velocity and position for other biases, to first order in their change.
 
@@ -134,7 +141,7 @@ class Preintegrated(Records):
         """
         new = [_vector(*pair) for pair in (("rate_bias", rate_bias), ("force_bias", force_bias))]
         change = self.jacobian @ (np.concatenate(new) - np.concatenate([self.rate_bias, self.force_bias]))
-        turn = np.asarray(evaluator(UPDATE)(np.eye(3), change[..., :3]))
+        turn = np.asarray(_update()(np.eye(3), change[..., :3]))
         return replace(
             self,
             rotation=self.rotation @ turn,
@@ -306,7 +313,11 @@ class Preintegrator:
         number = self._count * max(1, int(duration / (self._nominal * self._count) + 0.5))
         length = duration / number
         low, high = -self.previous, number + self.ahead
-        times = np.array([(stamp - begin) * _SECOND for stamp in self._stamps]) * (1 / length)
+        reach = [
+            begin + (edge * length / _SECOND) for edge in (low - resampling.POINTS, high + resampling.POINTS)
+        ]
+        inside = slice(*(bisect_left(self._stamps, edge) for edge in reach))
+        times = np.array([(stamp - begin) * _SECOND for stamp in self._stamps[inside]]) * (1 / length)
         if len(times) < 2 or low < times[0] - SLACK or high > times[-1] + SLACK:
             raise PreintegrationError(
                 status.OUTSIDE,
@@ -314,9 +325,7 @@ class Preintegrator:
                 f"{self.ahead} after it",
             )
         boundaries = np.arange(low, high + 1).astype(np.float64)
-        samples = np.array(self._samples)
-        inside = slice(*np.searchsorted(times, [low - resampling.POINTS, high + resampling.POINTS]))
-        times, samples = times[inside], samples[inside]
+        samples = np.array(self._samples[inside])
         if self._input == "instants":
             grid = resampling.of_points(times, samples, boundaries, length)
         else:
@@ -347,6 +356,12 @@ class Preintegrator:
             for part, output in zip(sums, outputs, strict=True):
                 part[active] = output
         return sums
+
+
+@cache
+def _update() -> Evaluator:
+    """Return the kernel of the rotation after a change of the biases."""
+    return evaluator(UPDATE)
 
 
 def _vector(name: str, value: Any) -> Array:
