@@ -385,6 +385,7 @@ LONG_COMMANDS = (
 #: Parts of commands that ask for much of the same, and what they run with: fewer methods, samples, words, algorithms or
 #: workers, a lower order, a shorter run; one tool, since `make evidence` runs them all.
 LESS = {
+    "--aligned --runs 200": "--aligned --runs 10",
     "velocity-position-jacobian --method magnus4": "velocity-position-jacobian --method rk1",
     "rates_at_nodes.py --order 4": "rates_at_nodes.py --order 3",
     "--method coning-compressed,magnus4,rk4,taylor2": "--method coning-compressed:2,magnus4:2,rk4:2,taylor2",

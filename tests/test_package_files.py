@@ -36,6 +36,13 @@ def test_workflow_pins_its_actions_by_commit(workflow):
         assert re.fullmatch(r"[\w./-]+@[0-9a-f]{40} # v\d+\.\d+\.\d+", action), action
 
 
+def test_the_action_installs_itself_and_pins_what_it_uses():
+    steps = (ROOT / "action.yml").read_text().partition("  steps:\n")[2]
+    (used,) = re.findall(r"uses: *(.*)", steps)
+    assert f"uses: {used}\n" in (ROOT / ".github/workflows/tests.yml").read_text()
+    assert 'run: python -m pip install "$ACTION"' in steps and "ACTION: ${{ github.action_path }}" in steps
+
+
 def test_tested_versions_of_python_are_those_of_the_classifiers():
     tested = re.search(r"python: \[(.*)\]", (ROOT / ".github/workflows/tests.yml").read_text())[1]
     stated = [c.rpartition(" ")[2] for c in PROJECT["classifiers"] if re.search(r":: 3\.\d+$", c)]

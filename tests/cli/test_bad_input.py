@@ -236,7 +236,7 @@ BAD = {
     "study velocity-position --force-set rms_m_s2=1 rms_g=1": "rms_m_s2 and rms_g are both given; one is needed",
     "study velocity-position --force-set rms": "--force-set 'rms' is no setting; NAME=VALUE is needed",
     "study velocity-position --force oscillation --force-set frequency_hz=0": "frequency_hz is 0; a number above 0",
-    "study velocity-position --motion swing": "motion 'swing' is not known; allowed: constant",
+    "study velocity-position --motion swing": "motion 'swing' is not known (did you mean swinging?); allowed: constant",
     "study velocity-position --duration 0.015": "duration 0.015 s is not a whole multiple of the sampling interval",
     "derive euler --method coning-compressed --rates": "rates at nodes do not go with it",
     # derive

@@ -166,6 +166,7 @@ def test_list(strapgen_says):
     assert list(data["motions"]) == [
         *("constant", "sinusoidal", "coning", "polynomial"),
         *("cone", "random", "slew", "ramps", "vibration"),
+        *("great-circle", "polar", "turn", "climb", "taxi", "s-turns", "swinging"),
     ]
     assert list(data["targets"]) == list(TARGETS)
     assert {*TARGETS} >= {"numpy", "c", "c-float", "c-fixed", "cpp", "cpp-float", "fixed-model"}

@@ -178,6 +178,8 @@ def test_a_fault_is_seen_and_named(name):
     assert data["drift_by_axis_deg_h"] == data["drift_axes_deg_h"]
     if name == "state_kept.c":  # no fault of the coefficients
         assert data["cause_confidence"] is data["replacement"] is None
+    elif name == "sample_late.c":  # two kept samples in reverse order would give the same
+        assert (round(data["cause_confidence"], 3), data["next_cause"]) == (0, causes.EARLIER_REVERSED)
     else:
         assert data["cause_confidence"] > 0.99 and data["next_cause"] not in (None, outcome.cause)
     assert {tuple(check) for check in data["checks"]} == {("name", "holds", "value")}
@@ -219,6 +221,9 @@ def test_a_cause_is_as_sure_as_the_next_one_allows():
     products = causes.Products(2, table, table)
     value, other = causes.confidence(products, causes.cause(products))
     assert (value, other) == (0.0, causes.REVERSED)
+    # Without a correction nothing is left, and of one that is late, nothing can be seen in a call of one sample.
+    table = {(-4, 0): 0.0, (-3, 0): 0.0, (-2, 0): 0.0, (-1, 0): 0.0}
+    assert causes.confidence(causes.Products(1, table, table), causes.ABSENT) == (1.0, causes.FACTOR_TWO)
     # A size of its own leaves nothing.
     table = {(-4, 0): 0.0, (-3, 0): 0.0, (-2, 0): 0.0, (-1, 0): 0.9 / 12}
     products = causes.Products(1, table, table)

@@ -571,6 +571,10 @@ def test_the_page_runs_as_it_says(tmp_path, monkeypatch, capsys):
             "generate euler --target c --with-runs --project fmu3",
             "--with-runs does not go with --project fmu3",
         ),
+        (
+            "window generate window-7-7 --target c --project fmu2",
+            "--project fmu2 goes with generate, two-speed and system",
+        ),
     ],
 )
 def test_bad_input_gets_one_line(command, said, tmp_path, monkeypatch, capsys):
@@ -580,6 +584,21 @@ def test_bad_input_gets_one_line(command, said, tmp_path, monkeypatch, capsys):
     printed = capsys.readouterr().err
     assert stop.value.code == 2 and printed.count("\n") == 1 and re.search(said, printed)
     assert not [*tmp_path.iterdir()]
+
+
+@pytest.mark.parametrize("kind", archive.VERSIONS)
+@pytest.mark.parametrize(
+    "command", ["two-speed dcm --target c-float", "system two-speed-dcm --target c-float"]
+)
+def test_other_commands_write_units(command, kind, tmp_path):
+    needed("cc")
+    with pytest.raises(SystemExit) as stop:
+        main([*command.split(), "--project", kind, "--out", str(tmp_path)])
+    assert stop.value.code in (None, 0)
+    (path,) = tmp_path.iterdir()
+    assert validate_fmu(str(path)) == []
+    made = re.sub(" --sculling 2", "", fmpy.read_model_description(str(path)).generationTool)
+    assert made.endswith(f"strapgen {command} --project {kind}")
 
 
 def test_a_unit_is_written_checked_and_not_written_over(tmp_path, monkeypatch, capsys):

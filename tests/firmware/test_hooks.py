@@ -52,15 +52,6 @@ def act(folder: Path, paths: str, options: str = "") -> subprocess.CompletedProc
     return done("bash", "-e", "-o", "pipefail", "-c", verify["run"], cwd=folder, **environment)
 
 
-def test_the_action_installs_itself_and_pins_what_it_uses():
-    first, install, verify = steps()
-    workflows = "".join(path.read_text() for path in (ROOT / ".github/workflows").glob("*.yml"))
-    assert first["uses"] in workflows
-    assert install["run"] == 'python -m pip install "$ACTION"'
-    assert install["env"] == {"ACTION": "${{ github.action_path }}"}
-    assert verify["shell"] == install["shell"] == "bash"
-
-
 @pytest.mark.long
 @pytest.mark.posix
 @pytest.mark.needs("bash", "gcc")

@@ -1,4 +1,4 @@
-"""Functions in Python and MATLAB: a right one holds, the cause of a fault is named, and a wrong call is refused."""
+"""Functions in Python, Rust and MATLAB: a right one holds, a fault is named, and a wrong call is refused."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from strapgen.firmware.check_code import foreign
 from strapgen.firmware.check_code.check_foreign import check_foreign
 from strapgen.firmware.check_code.foreign import Convention, ForeignStep
 from strapgen.firmware.check_code.interpreted import interpreted_source
+from strapgen.firmware.check_code.rust_source import rust_source
 from strapgen.ir.exceptions import StrapgenError
 
 #: The integrators: quaternions with the scalar part last.
@@ -250,3 +251,90 @@ def test_octave_that_is_missing_is_said(folder, monkeypatch):
     Path("step.m").write_text(MATLAB)
     with pytest.raises(StrapgenError, match="no Octave: 'no-octave' is not on the PATH; install octave"):
         checked("step.m")
+
+
+#: Two samples a call with references, and one with pointers and a struct.
+RUST = """
+fn cross(a: &[f64; 3], b: &[f64; 3]) -> [f64; 3] {
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+}
+#[repr(C)]
+pub struct Filter { pub q: [f64; 4], pub last: [f64; 3] }
+fn turn(q: &mut [f64; 4], v: [f64; 3]) {
+    let n = (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]).sqrt();
+    let s = if n > 1e-9 { (n / 2.0).sin() / n } else { 0.5 };
+    let (x, y, z, w) = (s * v[0], s * v[1], s * v[2], (n / 2.0).cos());
+    *q = [q[3] * x + q[0] * w + q[1] * z - q[2] * y, q[3] * y - q[0] * z + q[1] * w + q[2] * x,
+          q[3] * z + q[0] * y - q[1] * x + q[2] * w, q[3] * w - q[0] * x - q[1] * y - q[2] * z];
+}
+#[no_mangle] // the C library has a function of this name
+pub extern "C" fn step(q: &mut [f64; 4], delta_angle: &[[f64; 3]; 2]) {
+    let c = cross(&delta_angle[0], &delta_angle[1]);
+    let mut v = [0.0; 3];
+    for i in 0..3 { v[i] = delta_angle[0][i] + delta_angle[1][i] + FACTOR * 2.0 / 3.0 * c[i]; }
+    turn(q, v);
+}
+#[no_mangle]
+pub unsafe extern "C" fn begin(filter: *mut Filter) { (*filter).q = [0.0, 0.0, 0.0, 1.0]; (*filter).last = [0.0; 3]; }
+#[no_mangle]
+pub unsafe extern "C" fn update(filter: *mut Filter, gyro: *const f64, dt: f64) {
+    let (f, g) = (&mut *filter, std::slice::from_raw_parts(gyro, 3));
+    let d = [g[0] * dt, g[1] * dt, g[2] * dt];
+    let c = cross(&f.last, &d);
+    f.last = d;
+    turn(&mut f.q, [d[0] + FACTOR * c[0] / 12.0, d[1] + FACTOR * c[1] / 12.0, d[2] + FACTOR * c[2] / 12.0]);
+}
+#[no_mangle]
+pub extern "C" fn worded(name: &str) {}
+"""
+
+
+@pytest.mark.needs("rustc")
+@pytest.mark.parametrize(
+    ("factor", "how", "cause"),
+    [
+        pytest.param("1.0", ("step",), None, marks=pytest.mark.long),
+        (*("-1.0", ("step",)), causes.WRONG_SIGN),
+        pytest.param(
+            *("1.0", ("update", "filter, rates[3], dt -> filter.q", "begin")), None, marks=pytest.mark.long
+        ),
+        pytest.param(
+            *("2.0", ("update", "filter, rates[3], dt -> filter.q", "begin"), causes.FACTOR_TWO),
+            marks=pytest.mark.long,
+        ),
+    ],
+)
+def test_a_function_in_rust(folder, factor, how, cause):
+    Path("step.rs").write_text(RUST.replace("FACTOR", factor))
+    takes = "rates" if "update" in how else "increments"
+    outcome = check_foreign(ForeignStep(rust_source(Path("step.rs"), *how, takes=takes), takes=takes))
+    assert (outcome.file, outcome.holds, outcome.cause) == ("step.rs", cause is None, cause)
+
+
+@pytest.mark.needs("rustc")
+@pytest.mark.parametrize(
+    ("name", "text", "says"),
+    [
+        (
+            "stop",
+            RUST,
+            r'step.rs has no extern "C" fn stop \(did you mean step\?\); it has step, begin, update, worded',
+        ),
+        ("worded", RUST, r"step.rs: name has the type &str; allowed: f64, f32, bool"),
+        ("step", RUST, r"step.rs does not compile: error\[E0425\]: .*FACTOR.* \(step.rs:18:\d+\)"),
+    ],
+)
+def test_a_wrong_function_in_rust_is_refused(folder, name, text, says):
+    Path("step.rs").write_text(text)
+    with pytest.raises(StrapgenError, match=says) as caught:
+        rust_source(Path("step.rs"), name)
+    assert "\n" not in str(caught.value)
+
+
+def test_rust_without_a_compiler_or_a_file_is_refused(folder, monkeypatch):
+    monkeypatch.setenv("RUSTC", "no-rustc")
+    with pytest.raises(StrapgenError, match=r"step\.rs is no file"):
+        rust_source(Path("step.rs"), "step")
+    Path("step.rs").write_text(RUST)
+    with pytest.raises(StrapgenError, match="no Rust compiler: 'no-rustc' is not on the PATH; install rustc"):
+        rust_source(Path("step.rs"), "step")

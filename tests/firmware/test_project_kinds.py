@@ -174,6 +174,13 @@ def test_what_does_not_go_together_is_refused_in_one_line(command, message, tmp_
     assert list(tmp_path.iterdir()) == []
 
 
+def test_a_variant_brings_the_algorithm_and_the_line_the_kind(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "strapgen.toml").write_text('[variant.a]\nalgorithm = "euler-product"\ntarget = "c"\n')
+    assert says("generate --variant a --project zephyr --out there", capsys)[0] == 0
+    assert (tmp_path / "there/zephyr/module.yml").is_file()
+
+
 # What the builds' own tools say of the files that describe a project
 
 

@@ -82,7 +82,7 @@ RunAlgorithm = Annotated[
 CheckedAlgorithm = Annotated[
     str,
     _argument(
-        "dcm, euler or cayley-klein, or a Python file of your own, one in C, C++ or MATLAB, "
+        "dcm, euler or cayley-klein, or a Python file of your own, one in C, C++, Rust or MATLAB, "
         "or package.module:function.",
         _STEPS,
     ),

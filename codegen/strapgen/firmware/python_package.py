@@ -75,9 +75,6 @@ def python_files(project: Project) -> dict[str, str]:
             methods=[one for one in bindings if one.memory],
             dtypes=_TYPES,
             residuals=_RESIDUALS,
-            tolerances={
-                name: [*table.tolerances] for name, table in tables.items() if table.sources.fixed is None
-            },
             tables=tables,
         ),
         **{

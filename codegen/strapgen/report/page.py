@@ -64,22 +64,21 @@ def report_page(content: Content, versions: Mapping[str, str], digest: str) -> s
         "algorithms": "Formulas, formats, code",
         "versions": "Versions",
     }
-    parts = {name: _text(name) for name in ("page.css", "charts.js", "page.js")}
-    text = (
-        _environment()
-        .get_template("page.html.j2")
-        .render(
-            content=content,
-            sections=sections,
-            versions=versions,
-            digest=digest,
-            orders=ORDERS,
-            css=parts["page.css"],
-            javascript=parts["charts.js"] + parts["page.js"],
-            data=embedded(content.data()),
-        )
+    return page_of(
+        "page.html.j2",
+        content=content,
+        sections=sections,
+        versions=versions,
+        digest=digest,
+        orders=ORDERS,
+        javascript=_text("charts.js") + _text("page.js"),
+        data=embedded(content.data()),
     )
-    return text.lstrip()
+
+
+def page_of(template: str, **what: Any) -> str:
+    """Return the page of a template, in the style of all pages."""
+    return _environment().get_template(template).render(css=_text("page.css"), **what).lstrip()
 
 
 def _text(name: str) -> str:
@@ -107,7 +106,7 @@ def _finite(data: Any) -> Any:
 
 
 @dataclass(frozen=True)
-class _PageCell:
+class PageCell:
     """A cell of a table."""
 
     text: str
@@ -190,11 +189,11 @@ class Content:
         """The algorithms that ran."""
         return [known for known in self.algorithms if known.runs is not None]
 
-    def step_rows(self) -> list[list[_PageCell]]:
+    def step_rows(self) -> list[list[PageCell]]:
         """Return the overview of the steps: a row for each."""
         return [self._step_row(known) for known in self.steps]
 
-    def _step_row(self, known: AlgorithmDossier) -> list[_PageCell]:
+    def _step_row(self, known: AlgorithmDossier) -> list[PageCell]:
         assert known.runs is not None, "a step ran"
         data = self.results[known.choice.kernel]
         run, ladder = data["simulate"]["data"], data["converge"]["data"][0]
@@ -208,25 +207,25 @@ class Content:
             *(_rounding(known.runs.certified.get(name), rows.get(name, {})) for name in self.backends),
         ]
 
-    def kernel_rows(self) -> list[list[_PageCell]]:
+    def kernel_rows(self) -> list[list[PageCell]]:
         """Return the overview of all kernels: a row for each."""
         return [
             [
                 *_costs(known),
                 self._bound(known),
                 _evidence_cell(shown.evidence),
-                _PageCell(known.kernel.title, known.kernel.title),
+                PageCell(known.kernel.title, known.kernel.title),
             ]
             for known, shown in zip(self.algorithms, self.views, strict=True)
         ]
 
-    def _bound(self, known: AlgorithmDossier) -> _PageCell:
+    def _bound(self, known: AlgorithmDossier) -> PageCell:
         """Return the error bound of the worst output in fixed point."""
         if "generate" not in (results := self.results[known.choice.kernel]):
-            return _PageCell("no fixed point", None, mark="note")
+            return PageCell("no fixed point", None, mark="note")
         return _figure(max(results["generate"]["data"]["error_bound"].values()))
 
-    def frontier_rows(self) -> list[list[_PageCell]]:
+    def frontier_rows(self) -> list[list[PageCell]]:
         """Return the algorithms that are compared by cost and drift: a row for each."""
         if not self.drifts_and_costs:
             return []
@@ -237,11 +236,11 @@ class Content:
             front = name in self.front
             rows.append(
                 [
-                    _PageCell(name, name, f"#{kernels[0]}" if kernels else "", "good" if front else ""),
-                    _PageCell("●" if front else "", 0 if front else 1),
+                    PageCell(name, name, f"#{kernels[0]}" if kernels else "", "good" if front else ""),
+                    PageCell("●" if front else "", 0 if front else 1),
                     *(_figure(one[f"{kind}_per_sample"], ".4g") for kind in ("multiply", "add", "other")),
                     _figure(one["drift_deg_h"][self.conditions.motion]),
-                    _PageCell(one["title"], one["title"], small=self._rest(one["source"])),
+                    PageCell(one["title"], one["title"], small=self._rest(one["source"])),
                 ]
             )
         return rows
@@ -286,7 +285,7 @@ class Content:
             )
         return facts
 
-    def claim_rows(self) -> list[list[_PageCell]]:
+    def claim_rows(self) -> list[list[PageCell]]:
         """Return the verdicts of tools by claim: the number of kernels for each kind of result."""
         kinds = ("proved", "agrees", "fails", "not examined", "not installed")
         claims = dict.fromkeys(claim for shown in self.views for claim in shown.evidence)
@@ -296,44 +295,44 @@ class Content:
                 shown.evidence[claim].partition(",")[0] for shown in self.views if claim in shown.evidence
             ]
             counts = [results.count(kind) for kind in kinds]
-            rows.append([_PageCell(claim, claim), *(_PageCell(str(count or "–"), count) for count in counts)])
+            rows.append([PageCell(claim, claim), *(PageCell(str(count or "–"), count) for count in counts)])
         return rows
 
 
-def _costs(known: AlgorithmDossier) -> list[_PageCell]:
+def _costs(known: AlgorithmDossier) -> list[PageCell]:
     """Return the name of a kernel and the operations of its program."""
     count = known.program.operations
     others = sum(n for kind, n in count.items() if kind not in ("multiply", "add", "negate"))
     name = known.choice.kernel
     return [
-        _PageCell(name, name, f"#{name}"),
-        *(_PageCell(str(number), number) for number in (count["multiply"], count["add"], others)),
+        PageCell(name, name, f"#{name}"),
+        *(PageCell(str(number), number) for number in (count["multiply"], count["add"], others)),
     ]
 
 
-def _figure(value: float | None, spec: str = _FIGURE) -> _PageCell:
+def _figure(value: float | None, spec: str = _FIGURE) -> PageCell:
     """Return a number as a cell; a dash for none."""
-    return _PageCell("–") if value is None else _PageCell(format(value, spec), value)
+    return PageCell("–") if value is None else PageCell(format(value, spec), value)
 
 
-def _rounding(certified: LargestRounding | None, row: Mapping[str, Any]) -> _PageCell:
+def _rounding(certified: LargestRounding | None, row: Mapping[str, Any]) -> PageCell:
     """Return what rounding has made of an attitude, with its radius; else the angle from the run in many digits."""
     if certified is None:
         return _figure(row.get("max_abs_rad"))
     small = f"\u00b1 {rounded_up(certified.radius)}"
-    return _PageCell(format(certified.angle, _FIGURE), certified.angle, small=small)
+    return PageCell(format(certified.angle, _FIGURE), certified.angle, small=small)
 
 
-def _evidence_cell(evidence: Mapping[str, str]) -> _PageCell:
+def _evidence_cell(evidence: Mapping[str, str]) -> PageCell:
     """Return the number of proved claims, and of those that agree with runs."""
     if not evidence:
-        return _PageCell("none on this code", None, mark="note")
+        return PageCell("none on this code", None, mark="note")
     proved, agrees = (
         sum(result.startswith(kind) for result in evidence.values()) for kind in ("proved", "agrees")
     )
     rest = len(evidence) - proved - agrees
     text = f"{proved} proved, {agrees} agree" + (f", {rest} open" if rest else "")
-    return _PageCell(text, proved + agrees)
+    return PageCell(text, proved + agrees)
 
 
 def _thesis_table(table: Table, entries: Iterable[TableEntry]) -> dict[str, Any]:
@@ -345,7 +344,7 @@ def _thesis_table(table: Table, entries: Iterable[TableEntry]) -> dict[str, Any]
     backends = dict.fromkeys(entry.backend for entry in by_place.values())
     rows = []
     for algorithm in ALGORITHMS:
-        printed = tuple(_PageCell(text, mark="note") for text in table.printed[algorithm])
+        printed = tuple(PageCell(text, mark="note") for text in table.printed[algorithm])
         rows.append((NAMES[algorithm], "thesis", printed))
         for name in backends:
             cells = tuple(_entry_cell(by_place[algorithm, name, order]) for order in ORDERS)
@@ -364,7 +363,7 @@ def _thesis_table(table: Table, entries: Iterable[TableEntry]) -> dict[str, Any]
     }
 
 
-def _entry_cell(entry: TableEntry) -> _PageCell:
+def _entry_cell(entry: TableEntry) -> PageCell:
     """Return a simulated figure, marked by whether it is that of the thesis."""
     mark = "note" if entry.roundoff_dominates else "good" if entry.agrees else "bad"
-    return _PageCell(f"{entry.normalised:.4g}", entry.normalised, mark=mark, small=f"{entry.drift_deg:.4g}°")
+    return PageCell(f"{entry.normalised:.4g}", entry.normalised, mark=mark, small=f"{entry.drift_deg:.4g}°")

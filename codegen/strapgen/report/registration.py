@@ -13,5 +13,6 @@ REGISTRATION = Registration(
             summary="Write one HTML file: formulas, code, bounds, runs and evidence",
         ),
     },
-    requires=("lab", "design", "evidence", "thesis"),
+    extensions={"check.report": f"{__package__}.check_page:check_page"},
+    requires=("lab", "design", "evidence", "firmware", "thesis"),
 )

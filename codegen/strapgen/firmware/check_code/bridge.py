@@ -123,11 +123,14 @@ class ForeignSource:
     counter: str = ""
     #: Further files that are compiled
     sources: tuple[Path, ...] = ()
+    #: The file of another language that was compiled, and options that link it
+    origin: Path | None = None
+    libraries: tuple[str, ...] = ()
 
     @property
     def file(self) -> Path:
         """The file, as the user has it."""
-        return self.read.path
+        return self.origin or self.read.path
 
     @property
     def is_integer(self) -> bool:

@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING, Annotated, ClassVar
 
 import typer
 
+from strapgen import registration
 from strapgen.cli import terminal
-from strapgen.cli.option_groups import Shown, grouped, stated
+from strapgen.cli.option_groups import Shown, command_line, grouped, stated
 from strapgen.cli.options import STEP_OPTIONS, CheckedAlgorithm, MethodOptions, option
 from strapgen.cli.output import TEXT_OUTPUT, Output
 from strapgen.cli.values import Positive, Vector
@@ -169,10 +170,16 @@ class ForeignOptions:
         option("--keep-shim", metavar="FILE", help="Write the generated code that calls it to a file."),
     ] = None
 
+    report: Annotated[
+        Path | None, option("--report", metavar="FILE", help="Write the findings as one HTML page to a file.")
+    ] = None
+
     def read(self, file: str) -> ForeignSource | InterpretedSource:
         """Return the function of a file, and how it is called."""
         from strapgen.firmware.check_code.bridge import read_source
+        from strapgen.firmware.check_code.foreign_arguments import RUST
         from strapgen.firmware.check_code.interpreted import interpreted_source, is_callable
+        from strapgen.firmware.check_code.rust_source import rust_source
 
         if is_callable(file):
             return interpreted_source(
@@ -180,8 +187,9 @@ class ForeignOptions:
             )
         if self.function is None:
             raise InputError(f"{file} needs --function; --function NAME says which one is checked")
-        return read_source(
-            *(file, self.function, self.arguments, self.init or "", self.precision),
+        read = rust_source if Path(file).suffix == RUST else read_source
+        return read(
+            *(Path(file), self.function, self.arguments, self.init or "", self.precision),
             takes=self.input or "",
             is_angle_said=self.angle_unit is not None,
             cflags=self.cflags or "",
@@ -264,20 +272,34 @@ def check(
     Example: strapgen check examples/check_foreign_c/correct.c --function integrator_update
     --scalar first --init integrator_init
     """
+    _check_report(foreign.report, output, algorithm, *(foreign.source or ()), foreign.compile_commands)
     output.check(algorithm, *method.files, *(foreign.source or ()), foreign.compile_commands)
-    from strapgen.firmware.check_code.foreign_arguments import FOREIGN_SUFFIXES, is_foreign
+    from strapgen.firmware.check_code.foreign_arguments import FOREIGN_SUFFIXES, RUST, is_foreign
     from strapgen.firmware.check_code.interpreted import is_callable
 
-    if is_foreign(algorithm) or is_callable(algorithm):
+    if is_foreign(algorithm) or is_callable(algorithm) or Path(algorithm).suffix == RUST:
         _refuse(stated(method), f"goes with an algorithm of strapgen; {algorithm} is code of your own")
         _check_foreign(algorithm, foreign, output)
     else:
         _refuse(
             stated(foreign),
-            f"goes with a file in C or C++ ({', '.join(FOREIGN_SUFFIXES)}), one in MATLAB or package.module:function; "
-            f"{algorithm} is none",
+            f"goes with a file in C or C++ ({', '.join(FOREIGN_SUFFIXES)}), one in Rust or MATLAB, or "
+            f"package.module:function; {algorithm} is none",
         )
         _check_step(algorithm, method, output)
+
+
+def _check_report(report: Path | None, output: Output, *read: str | Path | None) -> None:
+    """Check that the page is written over no file that is read or written, and that its folder can hold it."""
+    from strapgen.storage.files import check_folder
+
+    if report is None:
+        return
+    if report.resolve() in [Path(file).resolve() for file in read if file is not None]:
+        raise InputError(f"--report {report} is a file that the command reads; another one is needed")
+    if output.file is not None and report.resolve() == output.file.resolve():
+        raise InputError(f"--out and --report are both {report}; two files are needed")
+    check_folder(report.parent)
 
 
 def _refuse(options: Iterable[str], reason: str) -> None:
@@ -333,6 +355,14 @@ def _check_foreign(file: str, foreign: ForeignOptions, output: Output) -> None:
     from strapgen.firmware.check_code.check_foreign import check_foreign
 
     result = check_foreign(foreign.step(source))
+    if foreign.report is not None:
+        from strapgen.storage.files import write_files
+
+        page = registration.extension("check.report", "--report")
+        for path in write_files(
+            Path(), {str(foreign.report): page(result, command_line("check", file, foreign))}
+        ):
+            terminal.remark(f"wrote {path}")
     output.show(result)
     _fail(file, result.findings, f"; likely cause: {result.cause}" if result.cause else "")
 

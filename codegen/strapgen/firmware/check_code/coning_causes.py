@@ -223,6 +223,8 @@ def confidence(products: Products, said: str) -> tuple[float, str] | None:
     left: dict[str, float] = {}
     ideals = [(RIGHT, base, ideal) for ideal, base in _ideals(products.samples)]
     for words, base, table in [*_faults(products), *ideals]:
+        if words != ABSENT and not _any(table):
+            continue  # nothing of it can be seen
         rest = _size(_plus(products.at_once, {pair: -c for pair, c in _plus(base, table).items()}))
         left[words] = min(left.get(words, math.inf), rest)
     if said == _by_size(products):

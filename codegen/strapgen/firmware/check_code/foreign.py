@@ -407,7 +407,13 @@ def compile_foreign(source: ForeignSource) -> Path:
             _preprocess(source, each).replace(str(text), "bridge") for each in (text, *source.sources)
         ]
     key = cache.digest(
-        [*preprocessed, bridge, repr(source.read.options), compiler.C.identity(_FLAGS), of.identity()]
+        [
+            *preprocessed,
+            bridge,
+            repr((source.read.options, source.libraries)),
+            compiler.C.identity(_FLAGS),
+            of.identity(),
+        ]
     )
 
     def fill(draft: Path) -> None:
@@ -417,6 +423,7 @@ def compile_foreign(source: ForeignSource) -> Path:
                 flags += ["-x", "c++" if is_cpp(each) else "c", str(each.resolve()), "-x", "none"]
             if source.read.is_cpp:
                 flags.append("-fno-access-control")
+            flags += source.libraries
             if reasons := compiler.compile_module(
                 draft, _MODULE, files, _DECLARATION, _DECLARATION, flags, of
             ):

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 
 #: Suffixes of files in C++, and of all files with code of users that is compiled; .C is C++ too.
 CPP_SUFFIXES = (".cc", ".cpp", ".cxx", ".c++", ".cp", ".hpp", ".hh", ".hxx", ".h++")
+RUST = ".rs"
 FOREIGN_SUFFIXES = (".c", ".h", *CPP_SUFFIXES)
 #: Names that say what an argument is.
 STATE, NEXT, INCREMENTS, RATES, PREVIOUS = "state", "next", "increments", "rates", "previous"
