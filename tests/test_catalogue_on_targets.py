@@ -111,6 +111,10 @@ def proper_inputs(name: str, evaluator: Evaluator, count: int, rng: np.random.Ge
         n = 1 + math.sqrt(2) * warped + warped**2
         for place, coefficient in enumerate((1 - 1 / n, warped / n, warped**2 / n), 3):
             inputs[place] = np.rint(coefficient / units[place]).astype(evaluator.number)
+    if name == "wind":  # a calm, where the error of its speed is largest
+        speed, heading = (inputs[place].astype(float) * units[place] for place in (1, 2))
+        calm = np.concatenate([speed * np.cos(heading), speed * np.sin(heading), 0 * speed], axis=1)
+        inputs[0] = np.rint(calm / units[0]).astype(evaluator.number)
     if "row_1" in names:
         rows = np.linalg.qr(rng.normal(size=(count, 3, 2)))[0]
         inputs[:2] = [np.rint(rows[:, :, k] / units[0]).astype(evaluator.number) for k in range(2)]
@@ -125,6 +129,8 @@ def share_of_range(kernel: str, signal: str, states: list[str]) -> Fraction:
         return Fraction(1, 4)  # no corner has two headings half a turn apart, where the error jumps
     if signal in ("sample", "first", "second", "sensed"):
         return Fraction(1, 4)
+    if kernel == "flight-path-angle":  # slow, where the error is largest
+        return Fraction(1, 256)
     if kernel in TRANSLATIONS and signal in ("velocity", "displacement"):
         return Fraction(1, 2)
     return Fraction(7, 8) if signal in states or (states and kernel in REDUNDANCY) else Fraction(1)

@@ -43,6 +43,7 @@ pipeline fixed_program
 pipeline program
 catalogue.derivation derive
 catalogue.derivation _of_catalogue
+cli.generate_command SourceOptions.files
 cli.generated_result GeneratedSources.of
 """
 

@@ -464,7 +464,7 @@ def closed_form_m_s2(standard: Design) -> float:
 
     >>> from strapgen.catalogue.methods.coning_coefficients import design
     >>> round(closed_form_m_s2(design(2)) * 1e3, 4), round(closed_form_m_s2(design(1)) * 1e3, 4)
-    (-0.4322, -5.6308)
+    (-0.4325, -5.6296)
     """
     rates = assessment.of(_choice(standard), "sculling").rates(
         ladder.FREQUENCY / (2 * math.pi),

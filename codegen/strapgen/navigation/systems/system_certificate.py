@@ -151,7 +151,7 @@ def certify_system(
     >>> turns, pushes = np.full((640, 3), 2e-4), np.full((640, 3), 3e-3)
     >>> found = certify_system(runner, {"gyro": turns, "accelerometer": pushes, "turn": np.zeros((640, 3))})
     >>> [(one.output, one.unit, one.rounding_radius < one.rounding / 1e6) for one in found.outputs]
-    [('slow_state', '1', True), ('nav_velocity_change', 'm/s', True)]
+    [('slow_state', 'rad', True), ('nav_velocity_change', 'm/s', True)]
     """
     balls.flint()
     if runner.many_digits:
