@@ -236,6 +236,7 @@ DRAWN = {
     "bounds": "paths/firmware",
     "word-length": "fixed-point",
     "flight-polar": "flights",
+    "order-or-step": "thesis",
 }
 
 

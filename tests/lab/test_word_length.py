@@ -158,3 +158,17 @@ def test_a_window_takes_its_samples_from_beside_the_step():
     assert window.truncation_deg < 1e-2 * rk4.truncation_deg
     assert window.rounding_deg <= window.bound_deg
     assert 0.1 < window.quantization_deg / window.expected_deg < 4
+
+
+def test_operations_are_those_of_the_step_in_a_second():
+    """37 multiplications and 31 additions of the fourth order on two increments, eight times a second."""
+    [case] = cases(words=12, carries="full", duration="2")
+    assert run_case(case).operations_per_s == (37 + 31) * 8
+
+
+def test_one_word_and_several_steps_are_drawn_against_operations(tmp_path):
+    outcomes = [
+        run_case(case) for case in cases(words=16, carries="full", duration="2", steps=("1/2", "1/4"))
+    ]
+    image = word_length_image(WordLengthResult(outcomes), tmp_path / "drift.svg").decode()
+    assert "operations in a second" in image and "word, bits" not in image

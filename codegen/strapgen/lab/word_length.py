@@ -12,6 +12,7 @@ import math
 import os
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import asdict, dataclass, field, replace
+from fractions import Fraction
 from functools import lru_cache
 from itertools import product
 from pathlib import Path
@@ -19,6 +20,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
+from strapgen import pipeline
 from strapgen.catalogue import AnyAlgorithm, Choice, choose_step, named
 from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError
@@ -131,7 +133,7 @@ class Outcome(Record):
     'rounding'
     """
 
-    computed: ClassVar[Properties] = properties(dominates=entry())
+    computed: ClassVar[Properties] = properties(dominates=entry(), operations_per_s=entry(unit="1/s"))
 
     case: Case = field(metadata=entry(spread=True))
     drift_deg: float | None
@@ -145,6 +147,12 @@ class Outcome(Record):
     __repr__ = short_repr
 
     @property
+    def operations_per_s(self) -> float:
+        """Operations of the step in a second, without changes of sign."""
+        case = self.case
+        return _operations(case.algorithm, case.method, case.increments) / float(Fraction(case.step))
+
+    @property
     def dominates(self) -> str:
         """The largest part of the drift: "rounding", "quantization" or "truncation"; "range" if the run left it."""
         if self.rounding_deg is None:
@@ -155,6 +163,12 @@ class Outcome(Record):
             "truncation": self.truncation_deg,
         }
         return max(parts, key=lambda name: parts[name])
+
+
+@lru_cache
+def _operations(algorithm: str, method: str, increments: int) -> int:
+    program = pipeline.program(choose_step(algorithm, method, increments))
+    return sum(count for name, count in program.operations.items() if name != "negate")
 
 
 @dataclass(frozen=True)

@@ -111,10 +111,14 @@ def _cells(outcome: Outcome) -> list[Any]:
 def word_length_image(result: WordLengthResult, path: str | Path) -> bytes:
     """Return drift against word length: a panel for each method, step and pulse, a line for each rounding and carry.
 
-    Dotted, in the colour of its line, the certified bound of the rounding, on top of what else moves the drift; dashed
-    the floor of the method, and where gyro pulses set a higher one, that.
+    Of one word and several steps it is drift against operations, see `_operations_image`. Dotted, in the colour of its
+    line, the certified bound of the rounding, on top of what else moves the drift; dashed the floor of the method, and
+    where gyro pulses set a higher one, that.
     """
     outcomes = result.outcomes
+    steps, words = ({getattr(o.case, name) for o in outcomes} for name in ("step", "word"))
+    if len(words) == 1 and len(steps) > 1:
+        return _operations_image(outcomes, path)
     panels = by_method_step_and_pulse(outcomes)
     columns = min(3, len(panels))
     rows = -(-len(panels) // columns)
@@ -136,6 +140,40 @@ def word_length_image(result: WordLengthResult, path: str | Path) -> bytes:
     figures.title(
         figure,
         f"{case.algorithm}: drift against word length\n"
+        f"{case.duration} s of {case.motion} motion, {settings_text(outcomes[0])}",
+    )
+    return figures.image(figure, path)
+
+
+def _operations_image(outcomes: Sequence[Outcome], path: str | Path) -> bytes:
+    """Return drift against operations in a second, a line for each method over its steps; dashed what truncation is."""
+    figure, grid = figures.grid_of_axes(1, 1, (9.5, 5.2))
+    axes = grid[0, 0]
+    kinds = list(
+        dict.fromkeys((o.case.method, o.case.rounding, o.case.carry, o.case.pulse_arcsec) for o in outcomes)
+    )
+    varied = [len({kind[place] for kind in kinds}) > 1 for place in range(4)]
+    for kind, colour in zip(kinds, figures.several_colours(len(kinds)), strict=True):
+        line = [
+            o for o in outcomes if (o.case.method, o.case.rounding, o.case.carry, o.case.pulse_arcsec) == kind
+        ]
+        line.sort(key=lambda outcome: outcome.operations_per_s)
+        rates = [outcome.operations_per_s for outcome in line]
+        drifts = [math.nan if outcome.drift_deg is None else outcome.drift_deg for outcome in line]
+        label = ", ".join(part for part, several in zip(kind, varied, strict=True) if several) or kind[0]
+        axes.plot(rates, drifts, "o-", color=colour, linewidth=1.4, markersize=4, label=label)
+        axes.plot(rates, [o.truncation_deg for o in line], "--", color=colour, linewidth=0.9)
+    axes.set_xscale("log")
+    axes.set_yscale("log")
+    axes.set_xlabel("operations in a second")
+    axes.set_ylabel("largest drift of the run, deg")
+    axes.plot([], [], "--", color="0.4", linewidth=0.9, label="truncation alone")
+    axes.legend(fontsize=9, frameon=False)
+    figures.style(axes)
+    case = outcomes[0].case
+    figures.title(
+        figure,
+        f"{case.algorithm}, words of {case.word} bits: drift against operations, a point for each step\n"
         f"{case.duration} s of {case.motion} motion, {settings_text(outcomes[0])}",
     )
     return figures.image(figure, path)
