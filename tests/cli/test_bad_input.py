@@ -81,7 +81,7 @@ BAD = {
     "stress --carry some": "carry 'some' is not known",
     "stress --format html": "format 'html' is not known; allowed: text, json, csv, markdown, latex",
     # Along a recording in two speeds
-    "strapdown dcm": "--recording is needed; none given",
+    "strapdown dcm": "one of --recording, --motion is needed; none given",
     f"strapdown dcm {LOG}": "fast-cycles is missing; an algorithm in two speeds needs it",
     "strapdown dcm --recording nowhere.csv --fast-cycles 4": "nowhere.csv cannot be read",
     f"strapdown dcm --recording {DATA}/increments.csv --fast-cycles 4": "no velocity increments along three axes",

@@ -316,6 +316,31 @@ def test_a_bad_motion_gets_one_line(words, message, capsys):
     assert error.count("\n") == 1
 
 
+def test_strapdown_runs_on_a_motion_over_the_earth(capsys):
+    words = [
+        "--motion",
+        "great-circle",
+        "--step",
+        "0.01",
+        "--duration",
+        "10",
+        "--backend",
+        "c",
+        "--format",
+        "json",
+    ]
+    run(["strapdown", "dcm", "--fast-cycles", "2", "--slow-cycles", "50", *words])
+    data = json.loads(capsys.readouterr().out)
+    assert np.allclose(data["heading_deg"], 45, atol=0.01) and np.allclose(data["pitch_deg"], 0, atol=1e-4)
+    run(["strapdown", NAVIGATOR, *words])
+    outputs = json.loads(capsys.readouterr().out)["outputs"]
+    course = motion("great-circle")
+    assert np.allclose(outputs["velocity_velocity"][-1], course.velocity(10.0), rtol=0, atol=1e-6)
+    assert np.allclose(outputs["position_position"][-1], course.position(10.0), rtol=0, atol=1e-12)
+    run(["strapdown", "dcm", "--fast-cycles", "2", "--motion", "polar", "--duration", "2"], 2)
+    assert "--motion needs --step in s" in capsys.readouterr().err
+
+
 def test_a_system_that_does_not_navigate_is_refused(capsys):
     run(["simulate", "examples/attitude.toml", "--motion", "polar", "--step", "0.01", "--duration", "2"], 2)
     assert "has no velocity (m/s, frame n) among its outputs" in capsys.readouterr().err

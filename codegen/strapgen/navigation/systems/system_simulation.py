@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from strapgen.cli.options import MethodOptions, SeveralMethods
     from strapgen.cli.output import Output
     from strapgen.lab.motions.motions import Motion
-    from strapgen.lab.recordings.recording import Recording
+    from strapgen.lab.recordings.recording import InertialRecording, Recording
     from strapgen.lab.run_options import RecordingOptions, RunOptions, RunOutput, SampleSource
     from strapgen.navigation.strapdown_command import CourseOutput, Start
     from strapgen.navigation.systems.system_runner import SystemMemory, SystemRunner
@@ -252,32 +252,41 @@ def system_along(
     name: str,
     others: Iterable[str],
     backend: str,
-    source: RecordingOptions,
+    source: SampleSource,
+    measured: tuple[InertialRecording, Motion | None],
     errors: str | None,
     start: Start,
     fixed: FixedOptions,
     output: CourseOutput,
 ) -> None:
-    """Run a described system along a recording, as sensors with errors measure it, and deliver its outputs."""
+    """Run a described system along a recording, as sensors with errors measure it, and deliver its outputs.
+
+    `measured`: the increments, and the motion over the earth that they are of, from whose truth the system begins.
+    """
     refuse_options(None, fixed, [*others, *([] if output.plot is None else ["--plot"])])
-    if any(start.frame_rate):
+    data, motion = measured
+    if motion is None and any(start.frame_rate or ()):
         raise InputError(
             "--frame-rate-deg-h does not go with a described system, whose navigation frame rests"
         )
     fixed.check_backend(backend)
-    output.check(name, source.file)
+    output.check(name, *source.files)
     from strapgen.cli.progress import waiting
+    from strapgen.navigation.systems import system_flight
     from strapgen.navigation.systems.system_runs import SystemCourseResult, begun, system_course
 
-    data = inertial(source, errors)
     runner = runner_of(described_along(name, data), backend, fixed)
-    memory = None
-    if any(start.initial):
+    true = None if motion is None else system_flight.over_earth(motion)
+    memory = None if true is None else system_flight.begun(runner, true)
+    if any(start.initial or ()) and memory is None:
         memory, _ = begun(runner, start.matrix())
     with waiting(f"running {name}"):
         course = system_course(runner, data, memory)
-    source.say_remarks(data)
-    facts = facts_of(runner, name) | {"source": source.source}
+    if motion is None:
+        source.say_remarks(data)
+        facts = facts_of(runner, name) | {"source": source.source}
+    else:
+        facts = facts_of(runner, name) | {"motion": source.described(motion.name)}
     facts |= {} if errors is None else {"errors": errors}
     format = output.format or ("text" if output.file is None else "csv")
     replace(output, format=format).show(SystemCourseResult(facts, course))
