@@ -7,7 +7,6 @@ import subprocess
 from collections.abc import Iterator
 from dataclasses import replace
 from fractions import Fraction
-from functools import partial
 from itertools import cycle, permutations
 
 import pytest
@@ -44,7 +43,10 @@ pytestmark = pytest.mark.needs("clang", "clang-tidy")
 @pytest.fixture(autouse=True)
 def few_vectors(monkeypatch):
     """Write a tenth of the vectors of a project: more of them are only more numbers, as in the evidence."""
-    few = partial(vectors_of_choice, count=clang_checks._VECTORS)
+
+    def few(choice, target, settings=None, count=0, **others):
+        return vectors_of_choice(choice, target, settings, clang_checks._VECTORS, **others)
+
     for module in (project, two_speed_project):
         monkeypatch.setattr(module, "vectors_of_choice", few)
 

@@ -30,8 +30,9 @@ _RECOVERY = 100
 _LONG, _LONG_INTERPRETED = 500_000, 20_000
 #: Samples of the cone after which it repeats, and every how many calls the length is read.
 _PERIOD, _READ = 10, 50
-#: Largest departure of C C' from the unit matrix in a long run; and rounding of a call in units in the last place.
-_NORM_WITHIN, _UNITS = 1e-4, 4
+#: Departures of C C' from the unit matrix in a long run: one that a normalized state keeps, and one that truncation of
+#: a good step without normalization leaves; and rounding of a call in units in the last place.
+_NORM_WITHIN, _TRUNCATION, _UNITS = 1e-4, 2e-3, 4
 #: Largest change without rotation that is rounding, in units in the last place.
 _STILL = 64
 #: Calls of a fast rotation, parts of the fastest rate, and the largest part of a rotation that rounding takes.
@@ -191,7 +192,8 @@ def _long_run(step: ForeignStep, convention: Convention) -> tuple[Finding, str]:
     text = f"{calls} on the cone C C' departs from the unit matrix by at most {off:.3g}"
     if off <= _NORM_WITHIN:
         return Finding("long run", True, text, off, _NORM_WITHIN), ""
-    if off <= rounding:
-        return Finding("long run", None, f"{text}: rounding adds up without normalization", off), ""
+    if off <= max(rounding, _TRUNCATION):
+        what = "rounding" if off <= rounding else "truncation"
+        return Finding("long run", None, f"{text}: {what} adds up without normalization", off), ""
     cause = f"the state's length is off in long runs: {lengths(states)[-1]:.6g} after {len(increments)} calls"
-    return Finding("long run", False, text, off, _NORM_WITHIN), cause
+    return Finding("long run", False, text, off, max(rounding, _TRUNCATION)), cause
