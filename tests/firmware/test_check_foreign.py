@@ -266,6 +266,16 @@ def test_direction_cosines_from_reference_to_body_hold_and_the_wrong_sense_is_na
     )
 
 
+def test_a_rotation_of_the_wrong_sign_is_named(outcome):
+    transposed = COSINES.replace("t[k][i]", "t[i][k]")
+    arguments = "state[3][3], increments[9] -> state[3][3]"
+    checked = outcome(transposed, arguments, Convention(sense="reference-to-body"))
+    assert failed(checked) == ["axes"]
+    assert checked.cause.startswith(
+        "the rotation has the wrong sign, or the attitude is body-to-reference, with"
+    )
+
+
 @pytest.mark.needs("g++")
 def test_a_filter_in_cpp_that_holds_its_attitude_and_takes_rates(outcome):
     checked = outcome(

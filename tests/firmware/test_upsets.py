@@ -119,6 +119,10 @@ def test_what_is_no_fault_in_itself_is_a_measurement(said, parts, name, text):
             {"DELTA": "for (int i = 0; i < 3; i++) d[i] = d[i] / dt * 0.01;"},
             *("dt of 0", "at dt = 0 without rotation the attitude becomes NaN"),
         ),
+        (
+            {"DELTA": "for (int i = 0; i < 3; i++) d[i] = gyro[i] / 100;"},
+            *("dropouts", "dt is an argument, and is not used"),
+        ),
         pytest.param(
             {"DELTA": "if (dt == 0) d[0] = 0.001;"},
             *("dt of 0", "at dt = 0 without rotation the attitude changes by 0.000"),
@@ -144,6 +148,18 @@ def test_a_fault_is_named(said, monkeypatch, parts, name, cause):
     monkeypatch.setattr("strapgen.firmware.check_code.foreign.PATIENCE", 5)
     findings, known = said(**parts)
     assert failed(findings) == [name] and cause in known
+
+
+def test_a_state_that_nothing_begins_is_named(outcome):
+    text = FILTER
+    for name, instead in {**PARTS, "STATE": ""}.items():
+        text = text.replace(name, instead)
+    checked = outcome(text, "rates[3], dt -> global q[4]")
+    assert not checked.holds
+    assert (
+        checked.cause
+        == "the attitude stays zero: --init names what makes it no rotation before the first call"
+    )
 
 
 @pytest.mark.long

@@ -214,6 +214,11 @@ class _Check:
             if calls.holds is False:
                 yield calls
                 return
+            if not any(run.states.any() for run in first.segments):
+                yield calls
+                text = "the attitude stays zero: --init names what makes it no rotation before the first call"
+                yield self.failed("axes", text)
+                return
             known, response = convention_of(self.step, directions(self.step, first.segments))
             if known is None:
                 yield calls
@@ -245,8 +250,11 @@ class _Check:
     def upsets(self, found: Sequence[Finding]) -> Iterator[Finding]:
         """Yield the findings on input that fails and on long runs, once the function is known to work otherwise."""
         if self.convention is not None:
-            lasts = all(finding.holds for finding in found if finding.name == "norm")
-            for finding, cause in upsets(self.step, self.convention, long=lasts):
+            lasts, rotates = (
+                all(finding.holds for finding in found if finding.name == name)
+                for name in ("norm", "rotation")
+            )
+            for finding, cause in upsets(self.step, self.convention, long=lasts, rotates=rotates):
                 self.causes.extend([cause] if cause else [])
                 yield finding
 
@@ -272,10 +280,19 @@ class _Check:
         declared = self.step.convention
         if self.step.source.arguments.elements == 4:
             yield self.fits("scalar", declared.scalar, known.scalar, "the scalar part stands")
+        about_reference = response.order_of_turns >= response.other_order
+        if about_reference and declared.sense != known.sense and off(response) <= SIZE_WITHIN:
+            text = "the rotation has the wrong sign"
+            also = f"or the attitude is {known.sense}, with a product in the wrong order"
+            self.causes.append(f"{text}, {also}")
+            yield Finding(
+                "axes", False, f"{text}: minus the samples turn it, {also}", response.order_of_turns
+            )
+            return
         yield self.fits("sense", declared.sense, known.sense, "the attitude is")
         if off(response) > SIZE_WITHIN:
             yield self.failed("axes", sizes_in_words(response.steady), off(response))
-        elif response.order_of_turns < response.other_order:
+        elif not about_reference:
             text = "rotations about x, y and z are those of the body"
             yield Finding("axes", True, text, off(response), SIZE_WITHIN)
         else:

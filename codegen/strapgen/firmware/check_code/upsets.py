@@ -41,19 +41,24 @@ _FAST_CALLS, _PARTS, _FAST_WITHIN = 40, (1.0, 0.5, 0.25, 0.125, 0.0625), 0.05
 _ALIKE = 0.02
 
 
-def upsets(step: ForeignStep, convention: Convention, *, long: bool) -> Iterator[tuple[Finding, str]]:
-    """Yield the findings of a function whose input fails, and of a long run, each with the cause of a failure or ""."""
+def upsets(
+    step: ForeignStep, convention: Convention, *, long: bool, rotates: bool = True
+) -> Iterator[tuple[Finding, str]]:
+    """Yield the findings of a function whose input fails, and of a long run, each with the cause of a failure or "".
+
+    `rotates`: whether a slow rotation is right, so that a fast one that is not overflows.
+    """
     if step.source.arguments.elements and step.source.arguments.named(INTERVAL, STEP):
         yield from _intervals(step, convention)
     if is_whole(step.source.arguments.samples):
-        yield _fast(step, convention)
+        yield _fast(step, convention, rotates)
     else:
         yield _not_a_number(step, convention)
     if long and step.source.arguments.elements > 3:
         yield _long_run(step, convention)
 
 
-def _fast(step: ForeignStep, convention: Convention) -> tuple[Finding, str]:
+def _fast(step: ForeignStep, convention: Convention, rotates: bool) -> tuple[Finding, str]:
     """Return whether integers hold the fastest rotation that a gyro measures, about each axis in both directions."""
     rates = [step.most / float(step.interval) * part for part in _PARTS]
     fed = [rate * sign * axis for rate in rates for axis in np.eye(3) for sign in (1, -1)]
@@ -73,7 +78,10 @@ def _fast(step: ForeignStep, convention: Convention) -> tuple[Finding, str]:
     at = f"at {rates[0]:.3g} rad/s ({np.degrees(rates[0]):.4g} deg/s) its integers"
     if worst[0] <= _FAST_WITHIN:
         return Finding("fast", True, f"{at} hold the rotation", worst[0], _FAST_WITHIN), ""
-    text = f"{at} overflow: a call turns wrong by {worst[0]:.3g} of it; it holds up to {held:.3g} rad/s"
+    wrong = f"a call turns wrong by {worst[0]:.3g} of it; it holds up to {held:.3g} rad/s"
+    if not rotates:
+        return Finding("fast", None, f"{at} may overflow, or the rotation is wrong: {wrong}", worst[0]), ""
+    text = f"{at} overflow: {wrong}"
     return Finding("fast", False, text, worst[0], _FAST_WITHIN), text
 
 
@@ -116,32 +124,47 @@ def _intervals(step: ForeignStep, convention: Convention) -> Iterator[tuple[Find
         holds, text = None, f"{text}, as it does at any dt"
     cause = text if holds is False else ""
     yield Finding("dt of 0", holds, text, off if np.isfinite(off) else None, allowed), cause
-    said = [
-        f"dt of {name}: {_said(step, convention, part)}"
-        for name, part in [*zip(cases, parts, strict=True)][2:]
-    ]
-    yield Finding("dropouts", None, "; ".join(said)), ""
+    others = [*zip(cases, parts, strict=True)][2:]
+    said = [f"dt of {name}: {_said(step, convention, part)}" for name, part in others]
+    turned = [_part_of_a_call(step, convention, part) for _, part in others]
+    unused = of_rates and all(abs(part - 1) < _ALIKE for part in turned)
+    cause = "dt is an argument, and is not used" if unused else ""
+    yield Finding("dropouts", False if unused else None, "; ".join(said)), cause
 
 
 def _change(step: ForeignStep, outputs: Array) -> Array:
-    """Return what the call of an upset changes; of a rotation vector, all of it."""
-    at = step.settling + _CALLS
+    """Return what the call of an upset changes of the attitude; of a rotation vector, all of it."""
+    at, outputs = step.settling + _CALLS, outputs[:, : step.source.arguments.elements]
     change: Array = outputs[at] - outputs[at - 1] if step.source.arguments.elements > 3 else outputs[at]
     return change
 
 
+def _turns(step: ForeignStep, convention: Convention, outputs: Array) -> tuple[Array, Array, Array]:
+    """Return the rotations of the calls before an upset, of that call, and of the last one, rad, body axes."""
+    matrices = convention.matrices(outputs[step.settling :, : step.source.arguments.elements])
+    before, at, after = (
+        rotation_vectors(matrices[k - 1].T @ matrices[k]) for k in (_CALLS - 1, _CALLS, len(matrices) - 1)
+    )
+    return before, at, after
+
+
+def _part_of_a_call(step: ForeignStep, convention: Convention, outputs: Array) -> float:
+    """Return how much of a usual call's rotation an upset call makes; NaN where it is not finite."""
+    if not np.isfinite(outputs).all():
+        return float("nan")
+    before, at, _ = _turns(step, convention, outputs)
+    return float(at @ before) / float(before @ before)
+
+
 def _said(step: ForeignStep, convention: Convention, outputs: Array) -> str:
     """Return in words what a call with another interval did, beside the steady calls before it."""
-    elements = step.source.arguments.elements
+    rows, elements = outputs, step.source.arguments.elements
     outputs = outputs[step.settling :, :elements]
     if not np.isfinite(outputs[_CALLS]).all():
         return "NaN" if not np.isfinite(outputs[-1]).all() else "NaN, then it recovers"
     if not np.isfinite(outputs[-1]).all():
         return "NaN in later calls"
-    matrices = convention.matrices(outputs)
-    before, at, after = (
-        rotation_vectors(matrices[k - 1].T @ matrices[k]) for k in (_CALLS - 1, _CALLS, len(outputs) - 1)
-    )
+    before, at, after = _turns(step, convention, rows)
     part = float(at @ before) / float(before @ before)
     frozen = float(np.linalg.norm(after)) < _ALIKE * float(np.linalg.norm(before))
     words = "the attitude stays" if abs(part) < _ALIKE else f"it turns by {part:.3g} of a usual call"
