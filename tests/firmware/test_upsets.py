@@ -150,39 +150,6 @@ def test_a_fault_is_named(said, monkeypatch, parts, name, cause):
     assert failed(findings) == [name] and cause in known
 
 
-#: The filter in a struct, of which `begin` clears what RESET says.
-HELD = """
-#include <math.h>
-typedef struct { double q[4], before[3]; } filter_t;
-void begin(filter_t *f) { RESET for (int i = 0; i < 3; i++) f->q[i] = 0; f->q[3] = 1; }
-void step(filter_t *f, const double d[3])
-{
-    double v[3], r[4];
-    for (int i = 0; i < 3; i++) {
-        const int j = (i + 1) % 3, k = (i + 2) % 3;
-        v[i] = d[i] + (f->before[j] * d[k] - f->before[k] * d[j]) / 12;
-    }
-    for (int i = 0; i < 3; i++) f->before[i] = d[i];
-    const double a = v[0] * v[0] + v[1] * v[1] + v[2] * v[2], n = sqrt(a);
-    const double s = n > 1e-5 ? sin(n / 2) / n : 0.5 - a / 48, w = cos(n / 2), *q = f->q;
-    const double x = s * v[0], y = s * v[1], z = s * v[2];
-    r[0] = q[3] * x + q[0] * w + q[1] * z - q[2] * y; r[1] = q[3] * y - q[0] * z + q[1] * w + q[2] * x;
-    r[2] = q[3] * z + q[0] * y - q[1] * x + q[2] * w; r[3] = q[3] * w - q[0] * x - q[1] * y - q[2] * z;
-    for (int i = 0; i < 4; i++) f->q[i] = r[i];
-}
-"""
-
-
-@pytest.mark.parametrize(
-    ("reset", "names", "cause"),
-    [("for (int i = 0; i < 3; i++) f->before[i] = 0;", [], None), ("", ["runs"], "state kept between runs")],
-)
-def test_what_begins_a_run_gets_the_memory_of_the_run_before(outcome, reset, names, cause):
-    checked = outcome(HELD.replace("RESET", reset), "filter_t *f, increments[3] -> f.q[4]", init="begin")
-    assert [one.name for one in checked.findings if one.holds is False] == names
-    assert checked.cause == cause
-
-
 def test_a_state_that_nothing_begins_is_named(outcome):
     text = FILTER
     for name, instead in {**PARTS, "STATE": ""}.items():

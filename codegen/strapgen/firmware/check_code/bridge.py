@@ -400,7 +400,7 @@ def _reset(source: ForeignSource) -> list[str]:
         if source.read.is_cpp:
             lines += [f"if ({name}_lives)", f"    {name}.~{name}_t();"]
             lines += [f"new ({name}_bytes) {name}_t({made});", f"{name}_lives = true;"]
-        elif name not in source.begins:  # what --init leaves there of the run before is its fault
+        else:
             lines.append(f"memset(&{name}, 0, sizeof {name});")
     number = 0
     for result in source.arguments.results:
