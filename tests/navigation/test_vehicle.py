@@ -229,7 +229,9 @@ def test_a_course_of_a_file_does_what_its_legs_say(tmp_path):
 @pytest.fixture
 def track(tmp_path):
     """The file of a track, and the motion that it is of."""
-    course, times = motion("s-turns", speed_m_s=120, height_m=500), np.arange(0, 60.01, 0.2)
+    # Over 180 degrees of longitude, and with headings on both sides of north.
+    settings = {"longitude_deg": 179.999, "heading_deg": 330, "speed_m_s": 120, "height_m": 500}
+    course, times = motion("s-turns", **settings), np.arange(0, 60.01, 0.2)
     place = np.asarray(evaluator("geographic-angles")(course.position(times), np.zeros((len(times), 3))))
     roll, pitch, heading = course.controls.angles(times)[0]
     heading = np.mod(heading - place[:, 2], math.tau)
@@ -261,6 +263,7 @@ def test_a_recorded_track_is_the_motion_that_it_was_recorded_on(track):
         ("18.1,", "soon,", "row 4 is no row of numbers"),
         ("18.1,", "nan,", "row 4 has a number that is not finite"),
         ("17.5,45.0", "17.5,89.95", "comes within 0.1 deg of a pole"),
+        ("17.5,45.0", "17.5,-89.95", "comes within 0.1 deg of a pole"),
     ],
 )
 def test_a_bad_track_gets_one_line(track, old, new, message, capsys):
