@@ -27,6 +27,24 @@ from strapgen.lab.run_options import (
     read_errors,
 )
 
+_SampleRate = Annotated[
+    Positive | None,
+    option(
+        "--sample-hz",
+        metavar="HZ",
+        help="Samples of the sensors in a second, in place of those in the file.",
+        panel="Input",
+    ),
+]
+_Aligned = Annotated[
+    bool,
+    option(
+        "--aligned",
+        help="With --errors: begin with the vertical that the sensors measure, as after an alignment at rest.",
+        panel="Input",
+    ),
+]
+
 
 @grouped
 @rules(Needs("--aligned", "--errors"))
@@ -43,15 +61,7 @@ def study_system(
             read=a_backend,
         ),
     ] = ("c-float", "c-fixed32", "c-fixed16"),
-    sample_hz: Annotated[
-        Positive | None,
-        option(
-            "--sample-hz",
-            metavar="HZ",
-            help="Samples of the sensors in a second, in place of those in the file.",
-            panel="Input",
-        ),
-    ] = None,
+    sample_hz: _SampleRate = None,
     duration: Duration = Positive("60"),
     motion: Annotated[str, motion_option("swinging")] = "swinging",
     settings: MotionSettings = None,
@@ -78,14 +88,7 @@ def study_system(
         ),
     ] = None,
     errors: SensorFile = None,
-    aligned: Annotated[
-        bool,
-        option(
-            "--aligned",
-            help="With --errors: begin with the vertical that the sensors measure, as after an alignment at rest.",
-            panel="Input",
-        ),
-    ] = False,
+    aligned: _Aligned = False,
     cpu: Processor = None,
     fixed: Annotated[FixedOptions, Shown(only=("rounding", "carry", "allowance"))],
     output: Output,
@@ -129,24 +132,9 @@ def study_flight_errors(
     motion: Annotated[str, motion_option("great-circle")] = "great-circle",
     settings: MotionSettings = None,
     duration: Duration = Positive("3600"),
-    sample_hz: Annotated[
-        Positive | None,
-        option(
-            "--sample-hz",
-            metavar="HZ",
-            help="Samples of the sensors in a second, in place of those in the file.",
-            panel="Input",
-        ),
-    ] = None,
+    sample_hz: _SampleRate = None,
     errors: SensorFile = None,
-    aligned: Annotated[
-        bool,
-        option(
-            "--aligned",
-            help="Begin with the vertical that the sensors measure, as after an alignment at rest.",
-            panel="Input",
-        ),
-    ] = False,
+    aligned: _Aligned = False,
     runs: Annotated[
         int,
         option(

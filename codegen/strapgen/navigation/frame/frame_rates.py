@@ -6,7 +6,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from fractions import Fraction
 
+import numpy as np
 import sympy as sp
+from numpy.typing import NDArray
 
 from strapgen.catalogue.kernels.two_speed_kernels import TURN
 from strapgen.ir.exceptions import InputError
@@ -279,6 +281,16 @@ class Earth:
             "centrifugal_ratio": rate**2 * radius**2 * polar / mu,
         }
         return cls("ellipsoid", radius, rate, constants)
+
+    def transverse_radius(self, sine: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return R_N in m at some sines of latitude."""
+        square = self.constants.get("eccentricity_squared", 0.0)
+        return np.asarray(self.radius / np.sqrt(1 - square * sine**2))
+
+    def meridian_radius(self, sine: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return R_M in m at some sines of latitude."""
+        square = self.constants.get("eccentricity_squared", 0.0)
+        return np.asarray(self.transverse_radius(sine) * (1 - square) / (1 - square * sine**2))
 
 
 SOMIGLIANA = "W. A. Heiskanen and H. Moritz, Physical Geodesy (1967), equations (2-78) and (2-123)"

@@ -126,12 +126,10 @@ def _motion(name: str, text: str) -> VehicleMotion:
 def _velocity(place: Any, height: Array, time: Array) -> tuple[Array, Array]:
     """Return the velocity along x and y of wander-azimuth axes in m/s, (N, 2), and the wander angle in rad."""
     earth = Earth.wgs84()
-    square = earth.constants["eccentricity_squared"]
     sine, cosine = np.sin(place(time)[:, 0]), np.cos(place(time)[:, 0])
     north_rate, east_rate = place(time, 1).T
-    transverse = earth.radius / np.sqrt(1 - square * sine**2)
-    meridian = transverse * (1 - square) / (1 - square * sine**2)
-    east, north = (transverse + height) * cosine * east_rate, (meridian + height) * north_rate
+    east = (earth.transverse_radius(sine) + height) * cosine * east_rate
+    north = (earth.meridian_radius(sine) + height) * north_rate
     wander = -_splines()(time, east_rate * sine, k=_DEGREE).antiderivative()(time)
     c, s = np.cos(wander), np.sin(wander)
     return np.column_stack([c * east + s * north, c * north - s * east]), np.asarray(wander)

@@ -98,20 +98,12 @@ class VehicleMotion(Motion):
 
     def navigation_attitude(self, time: Any) -> Array:
         """Return C_b^n at some times, (..., 3, 3)."""
-        angles, _ = self.controls.angles(np.asarray(time, float))
-        return self._attitude([(np.sin(a), np.cos(a)) for a in angles])
+        return self._attitude(self.controls.angles(np.asarray(time, float))[0])
 
     @staticmethod
-    def _attitude(angles: list[tuple[Array, Array]]) -> Array:
-        """Return C_b^n from the sines and cosines of roll, pitch and heading."""
-        (sr, cr), (sp, cp), (sh, ch) = angles
-        rows = [
-            [cp * ch, sr * sp * ch - cr * sh, cr * sp * ch + sr * sh],
-            [cp * sh, sr * sp * sh + cr * ch, cr * sp * sh - sr * ch],
-            [-sp, sr * cp, cr * cp],
-        ]
-        matrix = np.moveaxis(np.array(rows), (0, 1), (-2, -1))
-        return np.asarray(_EAST_NORTH_UP @ matrix)
+    def _attitude(angles: tuple[Array, Array, Array]) -> Array:
+        """Return C_b^n of roll, pitch and heading."""
+        return np.asarray(_EAST_NORTH_UP @ evaluator("dcm-from-euler-angles")(np.stack(angles, axis=-1)))
 
     def velocity(self, time: Any) -> Array:
         """Return the velocity relative to the earth in m/s, axes n, (..., 3)."""
@@ -134,9 +126,8 @@ class VehicleMotion(Motion):
         """Return rate and specific force at some times."""
         times = np.asarray(time, float)
         angles, rates = self.controls.angles(times)
-        waves = [(np.sin(a), np.cos(a)) for a in angles]
-        (sr, cr), (sp, cp), _ = waves
-        attitude = self._attitude(waves)
+        (sr, cr), (sp, cp) = ((np.sin(angle), np.cos(angle)) for angle in angles[:2])
+        attitude = self._attitude(angles)
         roll_rate, pitch_rate, turn_rate = rates
         in_body = np.stack(
             [
@@ -171,9 +162,8 @@ class VehicleMotion(Motion):
 
     def mean_radius(self, time: Any) -> Array:
         """Return the radius of the earth at some times, that of Gauss, and the height, in m."""
-        square = self.earth.constants["eccentricity_squared"]
         sine = self.position(time)[..., 2, 2]
-        radius = self.earth.radius * math.sqrt(1 - square) / (1 - square * sine**2)
+        radius = np.sqrt(self.earth.transverse_radius(sine) * self.earth.meridian_radius(sine))
         return np.asarray(radius + self.height(time))
 
     def _transport(self, position: Array, velocity: Array, height: Array) -> Array:
@@ -231,7 +221,7 @@ class VehicleMotion(Motion):
     def cartesian(self, up: Array, height: Array) -> Array:
         """Return places in axes e in m, (..., 3), of their normals to the ellipsoid and heights."""
         square = self.earth.constants["eccentricity_squared"]
-        transverse = self.earth.radius / np.sqrt(1 - square * up[..., 2] ** 2)
+        transverse = self.earth.transverse_radius(up[..., 2])
         scale = np.stack([transverse, transverse, transverse * (1 - square)], axis=-1)
         return np.asarray((scale + height[..., None]) * up)
 
