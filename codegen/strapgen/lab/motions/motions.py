@@ -279,7 +279,11 @@ def motion(name: str, /, **settings: float | str | Fraction) -> Motion:
     """
     known, entry = keys(name), MOTIONS[name]
     if settings or not entry.complete:
-        parameters = settings_of(f"motion {name}", known, settings, entry.defaults)
+        try:
+            parameters = settings_of(f"motion {name}", known, settings, entry.defaults)
+        except InputError as error:
+            error.in_file = True  # its names are keys, not options
+            raise
     else:
         parameters = dict(entry.defaults)
     if not MOTIONS[name].function:
