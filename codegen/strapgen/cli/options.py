@@ -282,9 +282,10 @@ class MethodOptions:
     layout: Annotated[
         Path | None,
         option(
-            "--layout",
+            *("--layout", "--filter"),
             metavar="FILE",
-            help="TOML file with the layout of gyros for the kernels separate and measure.",
+            help="TOML file of what a kernel computes: the layout of gyros of separate and torques, the sections of "
+            "filter.",
         ),
     ] = None
 
