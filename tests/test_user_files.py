@@ -256,6 +256,7 @@ WRONG = {
             ("rate_sigma_deg_h", "rate_sigma_deg_s", "key 'rate_sigma_deg_s' is not known (did you mean"),
             ("[0, 1, 0]", "[0, 1]", "positions[1] has 2 entries; 3 are needed"),
             ("[0, 1, 0]", "[0, 2, 0]", "positions[1] has the length 2; 1 is needed"),
+            ("positions = [", "pause_s = -1\npositions = [", "pause_s is -1; a whole number from 0 to 100000 in s"),
         ],
     ),
     "variants": (
