@@ -77,7 +77,7 @@ COMPENSATION = {
 }
 
 _READER = "strapgen.navigation.instruments.layout:read"
-#: Kernels of a layout that a file describes.
+#: Kernels of what a file describes: a layout of gyros, or a magnetic field.
 LAYOUTS = {
     "separate": _recipe(
         "rate and acceleration from torques, of a layout file",
@@ -87,6 +87,12 @@ LAYOUTS = {
     ),
     "torques": _recipe(
         "torques of mass-unbalanced gyros, of a layout file", "instruments.layouts", "measure", reader=_READER
+    ),
+    "magnetic-field": _recipe(
+        "magnetic field of the earth by spherical harmonics",
+        "frame.magnetic_field",
+        "magnetic_field",
+        reader="strapgen.navigation.frame.magnetic_file:read",
     ),
 }
 
