@@ -53,6 +53,7 @@ TWO_SPEED_LOOPS = {
 }
 
 _IMU, _PULSES, _SEPARATION = "instruments.imu_errors", "instruments.pulses", "instruments.separation"
+_OPTICAL = "instruments.optical_gyros"
 #: Kernels that correct the increments of sensors, and those that make their errors.
 COMPENSATION = {
     "imu-compensate": _recipe("compensation of a measurement unit", _IMU, "imu_compensate"),
@@ -70,6 +71,9 @@ COMPENSATION = {
     "temperature-coefficient": _recipe("coefficient by two slopes", _PULSES, "temperature_coefficient"),
     "scale-factor-heating": _recipe("scale factor by torquer heat", _PULSES, "scale_factor_heating"),
     "torquer-heating-errors": _recipe("errors by torquer heat", _PULSES, "scale_factor_heating", True),
+    "lock-in-errors": _recipe("increments of ring lasers that lock in", _OPTICAL, "lock_in_errors"),
+    "fibre-signal": _recipe("signals of fibre gyros without a loop", _OPTICAL, "fibre_signal"),
+    "fibre-rate": _recipe("rates of fibre gyros without a loop", _OPTICAL, "fibre_rate"),
     "separate-canonical": _recipe("rate and acceleration from torques", _SEPARATION, "separate", "canonical"),
     "separate-45": _recipe("separation, torquers at 45 degrees", _SEPARATION, "separate", "45"),
     "torques-canonical": _recipe("torques of mass-unbalanced gyros", _SEPARATION, "measure", "canonical"),
