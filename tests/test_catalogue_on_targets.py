@@ -76,6 +76,7 @@ COMPILED = (
 RANGES = {
     "butterworth-2": {"sample": Fraction(128), "first": Fraction(128), "second": Fraction(192)},
     **{f"axes-{mounting}": {"sensed": Fraction(128)} for mounting in MOUNTINGS},
+    "median-3": {name: Fraction(128) for name in ("unit_1", "unit_2", "unit_3", "trip")},
     "velocity-position": {"velocity_increments": Fraction(1, 2)},
     **{name: {"cycle": Fraction(1, 50)} for name in TRANSLATIONS},
 }

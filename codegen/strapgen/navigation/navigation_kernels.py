@@ -149,6 +149,7 @@ REDUNDANCY = {
         f"triad-hexad-{name}": _recipe(f"vector of sensors {', '.join(name)}", _REDUNDANCY, "triad", number)
         for number, name in enumerate(HEXAD_TRIADS)
     },
+    "median-3": _recipe("median of three units", _REDUNDANCY, "median_of_three"),
     "moment-arm": _recipe("velocity increment at a moment arm", _REDUNDANCY, "moment_arm"),
     "boresight": _recipe("mean relative attitude of two units", _REDUNDANCY, "boresight"),
 }
