@@ -278,8 +278,9 @@ def _scan(space: Array) -> Array:
     axis = np.linspace(-_REACH, _REACH, min(count, 4001))
     grid = np.stack(np.meshgrid(*[axis] * size, indexing="ij"), -1).reshape(-1, size)
     along = (space * np.linspace(0.1, _REACH, 80)[:, None, None]).transpose(0, 2, 1).reshape(-1, size)
-    points: Array = np.concatenate([grid, along])
-    return points[np.linalg.norm(points, axis=1) > _EQUAL]
+    points = np.concatenate([grid, along])
+    away: Array = points[np.linalg.norm(points, axis=1) > _EQUAL]
+    return away
 
 
 def _failed(alignment: Array, valid: list[int]) -> int | None:
