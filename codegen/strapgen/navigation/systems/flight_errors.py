@@ -38,6 +38,8 @@ Array = NDArray[np.float64]
 
 #: Causes whose covariance is known here.
 CAUSES = ("bias", "scale", "misalignment", "terms", "noise", "random walk")
+#: Those of them that differ from run to run even if constants are not drawn.
+RANDOM = CAUSES[4:]
 #: Longest interval of the covariance in s, and the largest angle of the body in one, in rad.
 _LONGEST, _LARGEST = 1.0, 0.05
 #: States: epsilon, u, theta, and the walking biases of gyros and accelerometers.
@@ -84,15 +86,19 @@ def spread(
     for cause in errors.causes:
         if cause not in CAUSES:
             raise InputError(f"errors of kind {cause} have no covariance here; {', '.join(CAUSES)} have one")
+    if not {*errors.causes} & {*(CAUSES if errors.drawn else RANDOM)}:
+        raise InputError(
+            'the sensors are the same in every run; constants = "drawn", noise or a random walk is needed'
+        )
     path = _Path(motion, duration, records)
     covariances: dict[str, Array] = {}
     for cause in errors.causes:
         alone = errors.only(cause)
-        if cause in ("noise", "random walk"):
+        if cause in RANDOM:
             covariances[cause] = path.of_noise(alone)
         else:
             singles = _singles(alone) if errors.drawn else []
-            covariances[cause] = path.of_constants(alone, singles, align)
+            covariances[cause] = path.of_constants(singles, align)
     return Spread(path.times, covariances)
 
 
@@ -185,9 +191,7 @@ class _Path:
                 rows.append(state)
         return self._seen(np.array(rows))
 
-    def of_constants(
-        self, errors: InstrumentErrors, singles: Sequence[InstrumentErrors], align: bool
-    ) -> Array:
+    def of_constants(self, singles: Sequence[InstrumentErrors], align: bool) -> Array:
         """Return the covariance by constants that every run draws: the squares of what each of them does."""
         if not singles:
             return np.zeros((self.records, len(_QUANTITIES), len(_QUANTITIES)))
