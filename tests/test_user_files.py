@@ -249,6 +249,15 @@ WRONG = {
             ("[1, 0, 0]", '[1, 0, "x"]', "axes[1][3] is 'x': numbers"),
         ],
     ),
+    "kalman": (
+        "examples/kalman/gyrocompass.toml",
+        "kalman FILE",
+        [
+            ("interval = 1", "interval = true", "schedule.interval is true; a number, or a text such as"),
+            ("deviation = 0.05", "sigma = 0.05", "state[azimuth]: key 'sigma' is not known"),
+            ("density", "densty", "noise.walk_north: key 'densty' is not known (did you mean density?)"),
+        ],
+    ),
     "calibration": (
         "examples/positions-20.toml",
         "study calibration FILE",

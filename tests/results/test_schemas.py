@@ -94,6 +94,7 @@ COMMANDS = {
     "window show window-3-3": "window",
     "window generate window-3-3 --target c --out OUT": "late-sources",
     "preintegrate --window pair-1-5 --out OUT": "preintegration",
+    "kalman examples/kalman/gyrocompass.toml --target c-fixed": "kalman",
     "stamped --sample-hz 200 --tick-hz 1e6 --out OUT": "stamped",
     "frontier --method rk4:2 --duration 1 --jobs 1": "frontier",
     "design examples/briefs/ahrs.toml --method coning-compressed --simulate 1 --jobs 1": "selection",
