@@ -28,7 +28,7 @@ Array = NDArray[np.float64]
 #: Most intervals of an integral along a motion.
 _MOST_INTERVALS = 50_000
 #: Causes whose effect is one and the same in every run, unless constants are drawn.
-STEADY = ("bandwidth", "delay", "bias", "scale", "misalignment", "terms", "warm-up", "heating")
+STEADY = ("bandwidth", "delay", "bias", "scale", "misalignment", "terms", "warm-up", "lock-in", "heating")
 #: Those of them whose numbers are constants, which a run can draw.
 DRAWN = ("bias", "scale", "misalignment", "terms")
 

@@ -15,6 +15,7 @@ from strapgen.ir import checks
 from strapgen.ir.checks import unknown
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.fixed_settings import Settings
+from strapgen.ir.formats import Format
 from strapgen.ir.notebook_display import Records, short_repr
 from strapgen.ir.program import Program
 from strapgen.ir.sources import Sources
@@ -193,17 +194,17 @@ class KalmanFilter:
             return [sources_of_program(program, target, settings) for program in self.programs]
         self._require_fixed(target)
         chosen = settings or Settings()
-        formats: dict[str, Any] = {}
-        first = [pipeline.quantize(program, chosen) for program in self.programs]
-        for program in first:
-            for name in self.states:
-                for place in (name, f"next_{name}"):
-                    one = program.formats[place]
-                    if name not in formats or one.fraction < formats[name].fraction:
-                        formats[name] = one
+        formats: dict[str, Format] = {}
+        for program in self.programs:
+            fixed = sources_of_program(program, target, chosen).fixed
+            assert fixed is not None
+            for one in (*fixed.inputs, *fixed.outputs):
+                name = one.signal.name.removeprefix("next_")
+                if name in self.states and one.format.fraction <= formats.get(name, one.format).fraction:
+                    formats[name] = one.format
         both = {place: str(one) for name, one in formats.items() for place in (name, f"next_{name}")}
         settings = replace(chosen, formats={**both, **chosen.formats})
-        return [pipeline.generate(program, target, settings) for program in self.programs]
+        return [sources_of_program(program, target, settings) for program in self.programs]
 
     def _require_fixed(self, target: str) -> None:
         if not self.is_fixed_gain:
