@@ -48,8 +48,10 @@ class Seen(IntegratedMotion):
 
 
 @cache
-def window(words: str, side: int, band: str = "1.9", powers: int = 2) -> Window:
-    brief = FamilyBrief(side, side, Fraction(band), conditions=powers, gyro=parse("gyro", words).at(RATE))
+def window(words: str, side: int, band: str = "1.9", powers: int = 2, v_taps: int = 0) -> Window:
+    gyro = parse("gyro", words).at(RATE)
+    taps = (side, v_taps) if v_taps else None
+    brief = FamilyBrief(side, side, Fraction(band), conditions=powers, gyro=gyro, taps=taps)
     return replace(design(brief), file="designed here")
 
 
@@ -68,6 +70,10 @@ def run(method, motion, words, **errors):
         ("vibration", FOURTH, (10,), 5.6e-6),
         ("random", FOURTH, (7, "1.3", 4), 1.0e-4),
         ("random", LATE, (7, "1.3", 4), 1.7e-4),
+        ("vibration", FOURTH, (7, "1.9", 2, 7), 6.2e-4),
+        ("vibration", FOURTH, (10, "1.9", 2, 10), 5.6e-6),
+        ("random", FOURTH, (8, "1.3", 4, 6), 1.0e-4),
+        ("random", LATE, (7, "1.3", 4, 7), 1.7e-4),
     ],
 )
 def test_a_window_for_the_response_leaves_next_to_nothing(motion, words, design, largest):

@@ -19,6 +19,7 @@ from strapgen.navigation.systems.flight_errors import runs, spread
 from strapgen.navigation.systems.system_flight import fly
 from strapgen.navigation.systems.system_runner import system_runner
 from strapgen.navigation.systems.wiring import described
+from strapgen.navigation.vehicle.vehicle_motion import VehicleMotion
 
 NAVIGATOR = "examples/navigator.toml"
 
@@ -51,9 +52,17 @@ def test_a_bias_does_what_the_error_equations_say(name, kind, axis, align):
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("align", [False, True])
-def test_the_covariance_contains_two_hundred_runs(align):
-    course, errors, duration = motion("s-turns"), read_errors("ins-1"), Fraction(600)
+@pytest.mark.parametrize(
+    ("course", "duration", "align"),
+    [
+        (motion("s-turns"), Fraction(600), False),
+        (motion("s-turns"), Fraction(600), True),
+        (motion("polar", latitude_deg=74), Fraction(14400), True),
+    ],
+    ids=["s-turns", "s-turns, aligned", "four hours and a pole, aligned"],
+)
+def test_the_covariance_contains_two_hundred_runs(course, duration, align):
+    errors = read_errors("ins-1")
     measured_runs = runs(navigator(), course, errors, duration, 10, 200, align)
     expected = spread(course, errors, duration, 10, align).deviations()
     ratio = measured_runs.std(axis=0, ddof=1)[-1] / expected[-1]
@@ -64,6 +73,19 @@ def test_the_covariance_contains_two_hundred_runs(align):
     # The mean of the runs is none but by chance.
     mean = measured_runs.mean(axis=0)[-1] / expected[-1]
     assert np.abs(mean).max() < 3.3 / math.sqrt(200)
+    # All axes together: 5 %.
+    assert math.isclose(math.sqrt((ratio**2).mean()), 1, abs_tol=0.05)
+
+
+def test_runs_take_the_true_increments_once(monkeypatch):
+    """The start of a run that is aligned takes the first of them, and the run all."""
+    asked = []
+    compute = VehicleMotion._both_samples
+    monkeypatch.setattr(
+        VehicleMotion, "_both_samples", lambda self, *ask: asked.append(ask) or compute(self, *ask)
+    )
+    runs(navigator(), motion("polar", latitude_deg=74), read_errors("ins-1"), Fraction(2), 2, 3, True)
+    assert asked == [(Fraction(1, 50), 0, 100)]
 
 
 @pytest.mark.parametrize(("name", "nmi_h"), [("ins-0.1", 0.1), ("ins-1", 1.0)])
@@ -101,6 +123,19 @@ def test_the_command_prints_runs_and_prediction(capsys, tmp_path):
     ] * 2
     assert [row["cause"] for row in data["causes"]] == ["all", "bias", "scale", "misalignment", "noise"]
     assert (tmp_path / "errors.svg").stat().st_size > 1000
+
+
+@pytest.mark.parametrize(
+    "errors",
+    [
+        InstrumentErrors(),
+        InstrumentErrors(drawn=True),
+        InstrumentErrors(gyro=TriadErrors(bias=np.full(3, 1e-5))),
+    ],
+)
+def test_sensors_that_are_the_same_in_every_run_are_refused(errors):
+    with pytest.raises(InputError, match="the sensors are the same in every run; constants"):
+        spread(motion("great-circle"), errors, Fraction(10), 1)
 
 
 def test_errors_without_covariance_are_refused():

@@ -226,6 +226,23 @@ def test_a_course_of_a_file_does_what_its_legs_say(tmp_path):
     require_consistent(course, 60)
 
 
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("angle_deg = 90", "angle_deg = 0", "leg 2: this turn changes nothing; leave it out"),
+        ("height_m = 300", "height_m = 0", "leg 3: this climb changes nothing; leave it out"),
+        ("speed_m_s = 150", "speed_m_s = 100", "leg 4: this accelerate changes nothing; leave it out"),
+        ("speed_m_s = 150", "speed_m_s = 0", "leg 5: this stop changes nothing; leave it out"),
+    ],
+)
+def test_a_leg_of_nothing_is_refused(tmp_path, old, new, message):
+    file = tmp_path / "course.toml"
+    assert COURSE.count(old) == 1
+    file.write_text(COURSE.replace(old, new))
+    with pytest.raises(InputError, match=message):
+        any_motion(str(file), 1, {})
+
+
 @pytest.fixture
 def track(tmp_path):
     """The file of a track, and the motion that it is of."""

@@ -78,8 +78,8 @@ def choose(
         of its code. Of a user's kernel with unknowns, values of these. A float stands for its shortest decimal form.
         `derive` refuses what the kernel has no input for.
     layout : path or Description, optional
-        Of the kernels "separate", "torques" and "filter": the file that describes the gyros, or the sections of a
-        filter, or what was read from it.
+        Of the kernels "separate", "torques", "magnetic-field" and "filter": the file that describes the gyros, the
+        field or the filter, or what was read from it.
 
     Raises
     ------
@@ -154,11 +154,13 @@ def _with_values(kernel: Kernel, values: Constants) -> Kernel:
 
 def _with_layout(choice: Choice, layout: str | Path | Description | None) -> Choice:
     if choice.name not in LAYOUT_KERNELS:
-        raise InputError(f"{choice.name} takes no file; these kernels do: {', '.join(LAYOUT_KERNELS)}")
+        raise InputError(f"{choice.name} takes no layout; these do: {', '.join(LAYOUT_KERNELS)}")
     if layout is None:
         others = ", ".join(name for name in KERNELS if name.startswith(f"{choice.name}-"))
         built_in = f"; kernels of built-in ones are {others}" if others else ""
-        raise InputError(f"{choice.name} needs the file of what it computes{built_in}")
+        raise InputError(
+            f"{choice.name} needs a file: layout names it, in a command --layout, --field or --filter{built_in}"
+        )
     if isinstance(layout, str | os.PathLike):
         read: Callable[[str | os.PathLike[str]], Description] = registration.load(
             LAYOUT_KERNELS[choice.name].reader
@@ -166,7 +168,7 @@ def _with_layout(choice: Choice, layout: str | Path | Description | None) -> Cho
         layout = read(layout)
     kernel = f"{choice.name}-{layout.name}"
     if kernel in KERNELS:
-        raise InputError(f"a file called {layout.name} would make the kernel {kernel}, which exists")
+        raise InputError(f"a layout called {layout.name} would make the kernel {kernel}, which exists")
     return replace(choice, layout=layout)
 
 

@@ -282,10 +282,13 @@ class MethodOptions:
     layout: Annotated[
         Path | None,
         option(
-            *("--layout", "--filter"),
+            "--layout",
+            "--field",
+            "--filter",
             metavar="FILE",
-            help="TOML file of what a kernel computes: the layout of gyros of separate and torques, the sections of "
-            "filter.",
+            help="File of a kernel that is made from one: TOML with the layout of gyros for separate and torques, the "
+            "coefficients of a World Magnetic Model (.COF) for magnetic-field, the sections of filter; --field and "
+            "--filter are other names of it.",
         ),
     ] = None
 

@@ -60,7 +60,7 @@ class FamilyBrief:
     increments : int, optional
         Samples of a step (N); several take the exact rotation.
     taps : (int, int), optional
-        Of a pair, the numbers of free taps on each side of the middle of the step, of F_1 and of F_2; `pair` has the
+        Of a pair, the numbers of free taps on each side of the middle of the step, of u and of v; `pair_side` has the
         samples that go with them. One-sided filters, up to `degree`, are those of a window.
 
     Raises
@@ -107,9 +107,7 @@ class FamilyBrief:
 
     def _check_pair(self, taps: tuple[int, int]) -> None:
         checks.count("increments", self.increments, largest=MOST_PAIR_INCREMENTS)
-        if self.gyro is not None:
-            raise InputError("a pair goes with no gyro; its increments are integrals of the rate")
-        # The sample in the middle of an odd number has a tap of F_2 itself.
+        # The sample in the middle of an odd number has a tap of v itself.
         least = self.conditions // 2, (self.conditions + 1) // 2 - self.increments % 2
         for filter, number, needed in zip("uv", taps, least, strict=True):
             checks.count(f"{filter}-taps", number, smallest=needed)
@@ -264,44 +262,47 @@ def _filters(brief: FamilyBrief, size: tuple[int, int], one_sided_noise: Fractio
 def _designed(brief: FamilyBrief, size: tuple[int, int], one_sided_noise: Fraction) -> tuple[Taps, ...]:
     """Design the filters with some samples before and ahead of the step."""
     shape = Shape(*size, brief.conditions, brief.gyro, brief.increments)
-    degrees = range(0 if brief.gyro else 1, brief.degree + 1)
     one_sided = size != (brief.previous, brief.ahead)
-    rows: tuple[Taps, ...]
-    if brief.taps is not None and not one_sided:
-        rows = _pair(brief, brief.taps)
-    else:
-        unknowns = [Unknowns(shape, m) for m in degrees]
-        taps: Sequence[Sequence[Any]]
-        if one_sided or brief.objective == "mean square":
-            noise = one_sided_noise if one_sided else brief.noise
-            taps = mean_square.mean_square_filters(shape, degrees, brief.band, noise, brief.spectrum)
-        elif shape.symmetric:
-            taps = [exchange.minimax_filter(each, brief.band).taps for each in unknowns]
-        else:
-            taps = mean_square.lawson_filters(shape, degrees, brief.band)
-        rows = tuple(rounded(each, row) for each, row in zip(unknowns, taps, strict=True))
-    if brief.gyro is not None:
-        return rows
+    noise = None if brief.objective == "minimax" else brief.noise
+    if one_sided:
+        noise = one_sided_noise
     step = range(shape.previous, shape.previous + shape.increments)
-    return (tuple(Fraction(place in step) for place in range(shape.samples)), *rows)
-
-
-def _pair(brief: FamilyBrief, taps: tuple[int, int]) -> tuple[Taps, Taps]:
-    """Return F_1 and F_2 of a pair: F_2 is designed as that of a window, and F_1 for its rationals."""
-    second: Taps | None = None
-    rows = []
-    for m, number in ((2, taps[1]), (1, taps[0])):
+    mean = tuple(Fraction(place in step) for place in range(shape.samples))
+    if brief.gyro is not None:
+        (mean,) = _best(brief, noise, shape, [0])
+    if brief.taps is None or one_sided:
+        return (mean, *_best(brief, noise, shape, range(1, brief.degree + 1)))
+    # Of a pair c_2 - 5 c_0 = 30 v first, then u for the rationals of v.
+    rows: list[Taps] = []
+    for m, number in ((2, brief.taps[1]), (1, brief.taps[0])):
         side = pair_side((number, number), brief.increments)
-        unknowns = Unknowns(Shape(side, side, brief.conditions, None, brief.increments), m)
-        if brief.objective == "minimax":
-            best: Sequence[Any] = exchange.minimax_filter(unknowns, brief.band, second=second).taps
-        else:
-            facts = unknowns.shape, [m], brief.band, brief.noise, brief.spectrum
-            (best,) = mean_square.mean_square_filters(*facts, second)
-        second = rounded(unknowns, best)
+        own = replace(shape, previous=side, ahead=side, pair=True)
+        (row,) = _best(brief, noise, own, [m], tuple(tap / 30 for tap in rows[0]) if rows else None)
         zeros = (Fraction(0),) * (brief.previous - side)
-        rows.append((*zeros, *second, *zeros))
-    return rows[1], rows[0]
+        rows.append((*zeros, *row, *zeros))
+    return mean, rows[1], tuple(a + 5 * b for a, b in zip(rows[0], mean, strict=True))
+
+
+def _best(
+    brief: FamilyBrief,
+    noise: Fraction | None,
+    shape: Shape,
+    degrees: Sequence[int],
+    lever: Taps | None = None,
+) -> tuple[Taps, ...]:
+    """Return the best filters as rationals, one for each degree: of least mean square error with a noise.
+
+    Without one they are of the least largest error. `lever`: v of a pair whose u is designed.
+    """
+    unknowns = [Unknowns(shape, m) for m in degrees]
+    taps: Sequence[Sequence[Any]]
+    if noise is not None:
+        taps = mean_square.mean_square_filters(shape, degrees, brief.band, noise, brief.spectrum, lever)
+    elif shape.symmetric:
+        taps = [exchange.minimax_filter(each, brief.band, lever=lever).taps for each in unknowns]
+    else:
+        taps = mean_square.lawson_filters(shape, degrees, brief.band, lever)
+    return tuple(rounded(each, row) for each, row in zip(unknowns, taps, strict=True))
 
 
 def written(family: Window, command: str) -> str:

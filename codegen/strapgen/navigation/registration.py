@@ -27,6 +27,11 @@ REGISTRATION = Registration(
             "Generate",
             summary="Generate a C++ header that preintegrates stamped samples",
         ),
+        "kalman": Command(
+            f"{__package__}.kalman.kalman_command:kalman",
+            "Generate",
+            summary="Derive a Kalman filter from its description and generate its code",
+        ),
         "strapdown": Command(
             f"{__package__}.strapdown_command:strapdown",
             "Run",
@@ -58,9 +63,11 @@ REGISTRATION = Registration(
         "filter": f"{__package__}.filters.filter_file:FILTER",
         "redundancy": f"{__package__}.redundancy.redundancy_kernels:GEOMETRY",
         "calibration": f"{__package__}.calibration:POSITIONS",
+        "kalman": f"{__package__}.kalman.kalman_file:KALMAN",
     },
     results={
         "preintegration": f"{__package__}.preintegration.preintegration_sources:PreintegrationResult",
+        "kalman": f"{__package__}.kalman.kalman_report:KalmanResult",
         "two-speed": f"{__package__}.two_speed.two_speed_command:TwoSpeedResult",
         "system": f"{__package__}.systems.system_report:SystemResult",
         "flight-errors": f"{__package__}.systems.flight_errors:FlightErrorsResult",

@@ -62,9 +62,9 @@ class Window:
     sibling : bool
         Whether it is one of the one-sided filters of another window.
     form : str
-        "legendre" if each filter gives its coefficient, or "pair": F_1 times F_2/30 - F_0/6 gives the second-order term
-        of the rotation vector where both factors are of one frequency, as in coning, and there are no other filters.
-        One-sided filters are of the first form.
+        "legendre" if each filter gives its coefficient, or "pair": u = F_1 times v = F_2/30 - F_0/6 gives the term of
+        second order of the rotation vector where both factors are of one frequency, as in coning, and there are no
+        other filters. One-sided filters are of the first form.
 
     Examples
     --------
@@ -143,8 +143,10 @@ class Window:
         return chosen, (chosen.increments, chosen.previous, chosen.ahead)
 
     def partner(self, m: int) -> Taps | None:
-        """Return F_2 for F_1 of a pair, whose product counts; None for a filter that counts by itself."""
-        return self.filters[2] if self.form == "pair" and m == 1 else None
+        """Return v for u of a pair, whose product counts; None for a filter that counts by itself."""
+        if self.form != "pair" or m != 1:
+            return None
+        return tuple(b / 30 - a / 6 for a, b in zip(self.filters[0], self.filters[2], strict=True))
 
     @property
     def total_increments(self) -> int:

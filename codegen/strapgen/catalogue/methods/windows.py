@@ -127,8 +127,8 @@ class WindowFile:
 
     def __post_init__(self) -> None:
         coefficient_files.check_gyro(self.gyro)
-        if self.form == "pair":
-            _check_pair(self)
+        if self.form == "pair" and len(self.filters) != 3:
+            raise InputError(f"filters has {counted(len(self.filters), 'row')}; a pair has 3, of c_0 to c_2")
         samples = self.previous + self.increments + self.ahead
         if samples > MOST_SAMPLES:
             raise InputError(f"the window has {samples} samples; at most {MOST_SAMPLES} are allowed")
@@ -427,14 +427,6 @@ def of_sibling(window: Window) -> dict[str, Any]:
     """
     rotation = "exact" if window.increments > 1 else window.rotation
     return {"sibling": True, "form": "legendre", "rotation": rotation}
-
-
-def _check_pair(file: WindowFile) -> None:
-    """Refuse a file of a pair with what does not go with one."""
-    if len(file.filters) != 3:
-        raise InputError(f"filters has {counted(len(file.filters), 'row')}; a pair has 3, of c_0 to c_2")
-    if file.gyro is not None:
-        raise InputError("a pair goes with no gyro; its increments are integrals of the rate")
 
 
 def _check_taps(what: str, rows: Sequence[Taps], count: int, samples: int) -> None:

@@ -93,34 +93,35 @@ class BandGrid:
         turns = [self._increments * b for b in self.points]
         return [integer((REAL.sin(x) - x) * self._increments**2 / (2 * x * x)) if x else 0 for x in turns]
 
-    def lever(self, second: Sequence[int]) -> list[int]:
-        """Return the response of F_2/30 - F_0/6, F_2 as many symmetric taps and F_0 those of an ideal gyro."""
-        errors = self.errors(2, second, (len(second) - self._increments) // 2)
-        wanted = zip(errors, self.bessel(2), self.bessel(0), strict=True)
-        return [(error + second_order - 5 * mean) // 30 for (error, _), second_order, mean in wanted]
+    def wanted(self, m: int) -> list[tuple[int, int]]:
+        """Return the response that gives a Legendre coefficient, as real and imaginary part, by frequency."""
+        return [(0, value) if m % 2 else (value, 0) for value in self.bessel(m)]
+
+    def response(self, taps: Sequence[int], previous: int | None = None) -> list[tuple[int, int]]:
+        """Return the response of taps as real and imaginary part, by frequency; by default as many on both sides."""
+        if previous is None:
+            previous = (len(taps) - self._increments) // 2
+        result = []
+        even, odd = _fold(taps, 2 * previous + self._increments - 1)
+        for cosines, sines, (x, y) in zip(self.cosines, self.sines, self.gains, strict=True):
+            c = sum(map(mul, even, cosines)) >> BITS
+            s = sum(map(mul, odd, sines)) >> BITS
+            result.append(((x * c - y * s) >> BITS, (x * s + y * c) >> BITS))
+        return result
 
     def errors(
-        self, m: int, taps: Sequence[int], previous: int, second: Sequence[int] | None = None
+        self, m: int, taps: Sequence[int], previous: int, lever: Sequence[int] | None = None
     ) -> list[tuple[int, int]]:
         """Return the error of a filter as real and imaginary part, by frequency.
 
-        With the taps of the second filter of a pair it is that of the product of its lever and the first filter.
+        With the taps v of a pair it is that of u times the conjugate of v, whose imaginary part is what drifts.
         """
-        if second is not None:
-            parts = zip(
-                self.errors(m, taps, previous), self.bessel(m), self.lever(second), self.coning(), strict=True
-            )
-            return [(0, ((im + own) * lever >> BITS) - wanted) for (_, im), own, lever, wanted in parts]
-        result = []
-        even, odd = _fold(taps, 2 * previous + self._increments - 1)
-        for cosines, sines, (x, y), right in zip(
-            self.cosines, self.sines, self.gains, self.bessel(m), strict=True
-        ):
-            c = sum(map(mul, even, cosines)) >> BITS
-            s = sum(map(mul, odd, sines)) >> BITS
-            re, im = (x * c - y * s) >> BITS, (x * s + y * c) >> BITS
-            result.append((re, im - right) if m % 2 else (re - right, im))
-        return result
+        found, wanted = self.response(taps, previous), self.wanted(m)
+        if lever is not None:
+            pairs = zip(found, self.response(lever), strict=True)
+            found = [((x * v + y * w) >> BITS, (y * v - x * w) >> BITS) for (x, y), (v, w) in pairs]
+            wanted = [(0, value) for value in self.coning()]
+        return [(x - re, y - im) for (x, y), (re, im) in zip(found, wanted, strict=True)]
 
 
 def _fold(taps: Sequence[int], twice_middle: int) -> tuple[list[int], list[int]]:

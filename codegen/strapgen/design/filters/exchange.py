@@ -225,18 +225,18 @@ class Minimax(NamedTuple):
 
 
 def minimax_filter(
-    unknowns: Unknowns, band: Fraction, points: int = SEARCH_POINTS, second: Taps | None = None
+    unknowns: Unknowns, band: Fraction, points: int = SEARCH_POINTS, lever: Taps | None = None
 ) -> Minimax:
     """Return the filter of the least largest error over a band under its conditions.
 
-    `band`: highest angular frequency in rad a sample. `second`: F_2 of a pair whose F_1 this is; see `BandGrid.errors`.
+    `band`: highest angular frequency in rad a sample. `lever`: v of a pair whose u this is; see `BandGrid.errors`.
 
     >>> from strapgen.design.filters.filter_taps import Shape
     >>> filter = minimax_filter(Unknowns(Shape(3, 3, 4), 1), Fraction(13, 10))
     >>> [round(float(tap), 12) for tap in filter.taps[4:]], f"{float(filter.level):.6e}"
     ([0.408856141152, -0.099584912922, 0.013437894897], '2.160751e-03')
     """
-    solution = least_largest(FilterProblem(unknowns, second), band, points)
+    solution = least_largest(FilterProblem(unknowns, lever), band, points)
     values = [REAL.mpf(x.numerator) / x.denominator for x in unknowns.complete([Fraction(0)] * unknowns.free)]
     for value, direction in zip(solution.free, unknowns.directions, strict=True):
         values = [x + value * d.numerator / d.denominator for x, d in zip(values, direction, strict=True)]
@@ -246,11 +246,11 @@ def minimax_filter(
 class FilterProblem:
     """The error of a symmetric or antisymmetric filter, whose answers are real."""
 
-    def __init__(self, unknowns: Unknowns, second: Taps | None = None) -> None:
+    def __init__(self, unknowns: Unknowns, lever: Taps | None = None) -> None:
         self._unknowns = unknowns
         self.title = f"the filter of c_{unknowns.m}"
         self.free = unknowns.free
-        self._second = None if second is None else list(map(integer, second))
+        self._lever = None if lever is None else list(map(integer, lever))
         self._directions = [[integer(x) for x in direction] for direction in unknowns.directions]
         self._base = [integer(x) for x in unknowns.complete([Fraction(0)] * unknowns.free)]
 
@@ -258,13 +258,13 @@ class FilterProblem:
         """Return the answers at frequencies in rad a sample."""
         unknowns = self._unknowns
         shape = unknowns.shape
-        reach = max(shape.samples, len(self._second or ())) // 2
+        reach = max(shape.samples, len(self._lever or ())) // 2
         grid = BandGrid(points, reach, increments=shape.increments)
-        gains, wanted = [gain for gain, _ in grid.gains], grid.bessel(unknowns.m)
-        if self._second is not None:
-            gains = [
-                gain * lever >> BITS for gain, lever in zip(gains, grid.lever(self._second), strict=True)
-            ]
+        gains = [gain for gain, _ in grid.gains]
+        wanted = [re + im for re, im in shape.wanted(grid, unknowns.m)]  # one of them is 0
+        if self._lever is not None:
+            levers = grid.response(self._lever)
+            gains = [gain * lever >> BITS for gain, (lever, _) in zip(gains, levers, strict=True)]
             wanted = grid.coning()
         tables = grid.sines if unknowns.m % 2 else grid.cosines
         single = []

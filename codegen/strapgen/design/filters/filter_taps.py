@@ -23,20 +23,24 @@ from numpy.typing import NDArray
 from strapgen.catalogue.methods import window_conditions
 from strapgen.catalogue.methods.sensor_response import Response
 from strapgen.catalogue.methods.window import Taps, Window
-from strapgen.design.filters.band_grid import ONE, REAL, distance, integer, search_grid
+from strapgen.design.filters.band_grid import ONE, REAL, BandGrid, distance, integer, search_grid
 from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError
 
 
 @dataclass(frozen=True)
 class Shape:
-    """Parameters of the conditions of a filter: samples around and in a step, number of powers, gyro."""
+    """Parameters of the conditions of filters: samples around and in a step, number of powers, gyro.
+
+    Of a pair the filter of degree 2 gives c_2 - 5 c_0 in place of c_2, which is 30 times what v gives.
+    """
 
     previous: int
     ahead: int
     conditions: int
     gyro: Response | None = None
     increments: int = 1
+    pair: bool = False
 
     @property
     def samples(self) -> int:
@@ -58,6 +62,21 @@ class Shape:
         """The increments of the powers of time, (conditions, samples)."""
         samples = self.increments, self.previous, self.ahead
         return window_conditions.increments(samples, self.conditions, self.gyro)
+
+    def right(self, m: int) -> Taps:
+        """Return the right sides of the conditions of a filter, (conditions,)."""
+        own, mean = (window_conditions.coefficients(degree, self.conditions) for degree in (m, 0))
+        return tuple(a - 5 * b for a, b in zip(own, mean, strict=True)) if self._is_lever(m) else own
+
+    def wanted(self, grid: BandGrid, m: int) -> list[tuple[int, int]]:
+        """Return the response that a filter is to have, as real and imaginary part, by frequency."""
+        own, mean = grid.wanted(m), grid.wanted(0)
+        return (
+            [(x - 5 * y, 0) for (x, _), (y, _) in zip(own, mean, strict=True)] if self._is_lever(m) else own
+        )
+
+    def _is_lever(self, m: int) -> bool:
+        return self.pair and m == 2
 
 
 @dataclass(frozen=True)
@@ -117,8 +136,8 @@ class Unknowns:
     @cached_property
     def right(self) -> list[Fraction]:
         """The right sides of the conditions."""
-        coefficients = window_conditions.coefficients(self.m, self.shape.conditions)
-        return [coefficients[k] for k in self.powers]
+        right = self.shape.right(self.m)
+        return [right[k] for k in self.powers]
 
     def complete(self, outer: Sequence[Fraction]) -> list[Fraction]:
         """Return all unknowns from the free ones, exactly."""
@@ -218,9 +237,8 @@ class _Search:
         self._grid = search_grid(
             window.band, window.total_increments - 1, window.gyro, _POINTS, window.increments
         )
-
-        second = window.partner(unknowns.m)
-        self._second = None if second is None else list(map(integer, second))
+        lever = window.partner(unknowns.m)
+        self._lever = None if lever is None else list(map(integer, lever))
 
     def best(self, taps: Taps) -> Taps:
         """Return the taps of the least largest error."""
@@ -276,7 +294,7 @@ class _Search:
         """Return the errors on the grid, with one of the unknowns a unit higher."""
         values = [value + self._unit * (place == moved) for place, value in enumerate(values)]
         taps = [integer(tap) for tap in self._unknowns.taps(values)]
-        errors = self._grid.errors(self._unknowns.m, taps, self._window.previous, self._second)
+        errors = self._grid.errors(self._unknowns.m, taps, self._window.previous, self._lever)
         return np.array([complex(re / ONE, im / ONE) for re, im in errors])
 
 

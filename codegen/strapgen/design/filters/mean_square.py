@@ -11,7 +11,6 @@ from fractions import Fraction
 from operator import mul
 from typing import Any
 
-from strapgen.catalogue.methods import window_conditions
 from strapgen.catalogue.methods.window import Taps
 from strapgen.design.filters.band_grid import (
     BITS,
@@ -34,40 +33,56 @@ def mean_square_filters(
     band: Fraction,
     noise: Fraction,
     spectrum: Sequence[int] | None = None,
-    second: Taps | None = None,
+    lever: Taps | None = None,
 ) -> list[list[Any]]:
     """Return the filters of the least mean of S |sum_j F_j A_j - C_m|^2 over a band plus sigma^2 sum_j F_j^2.
 
-    `band`: highest angular frequency in rad a sample; the mean is over `band_grid.mean_points`. `second`: F_2 of a pair
-    whose F_1 this is; the error is that of the product with its lever, by the root mean square of this.
+    `band`: highest angular frequency in rad a sample; the mean is over `band_grid.mean_points`. `lever`: v of a pair
+    whose u this is; the error is that of their product, by the root mean square of v.
 
     >>> taps, = mean_square_filters(Shape(1, 1, 3), [1], Fraction(1), Fraction(0))
     >>> [round(float(tap), 12) for tap in taps]
     [-0.25, 0.0, 0.25]
     """
-    grid = mean_grid(band, shape.samples - 1, shape.gyro, shape.increments)
+    grid = _grid(shape, band, lever)
     weights = [ONE] * len(grid.points) if spectrum is None else list(spectrum)
     weights = [weight // len(weights) for weight in weights]
-    if second is None:
-        return least_squares(grid, shape, degrees, weights, noise)
-    lever = grid.lever(list(map(integer, second)))
-    weights = [weight * value * value >> 2 * BITS for weight, value in zip(weights, lever, strict=True)]
-    weights = [(weight << BITS) // sum(weights) for weight in weights]
-    wanted = [(value << BITS) // by for value, by in zip(grid.coning(), lever, strict=True)]
-    return least_squares(grid, shape, degrees, weights, noise, wanted)
+    if lever is not None:
+        squares = _squares(grid.response(list(map(integer, lever))))
+        weights = [weight * square >> BITS for weight, square in zip(weights, squares, strict=True)]
+        weights = [(weight << BITS) // sum(weights) for weight in weights]
+    wanted = [_wanted(grid, shape, m, lever) for m in degrees]
+    return least_squares(grid, shape, degrees, wanted, weights, noise)
+
+
+def _grid(shape: Shape, band: Fraction, lever: Taps | None) -> BandGrid:
+    return mean_grid(band, max(shape.samples, len(lever or ())) - 1, shape.gyro, shape.increments)
+
+
+def _squares(values: Sequence[tuple[int, int]]) -> list[int]:
+    return [(x * x + y * y) >> BITS for x, y in values]
+
+
+def _wanted(grid: BandGrid, shape: Shape, m: int, lever: Taps | None) -> list[tuple[int, int]]:
+    """Return the response that a filter is to have: u of a pair that of coning by the conjugate of v."""
+    if lever is None:
+        return shape.wanted(grid, m)
+    levers = grid.response(list(map(integer, lever)))
+    parts = zip(grid.coning(), levers, _squares(levers), strict=True)
+    return [(-value * y // square, value * x // square) for value, (x, y), square in parts]
 
 
 def least_squares(
     grid: BandGrid,
     shape: Shape,
     degrees: Sequence[int],
+    wanted: Sequence[Sequence[tuple[int, int]]],
     weights: Sequence[int],
     noise: Fraction = Fraction(0),
-    wanted: Sequence[int] | None = None,
 ) -> list[list[Any]]:
     """Return the filters of least weighted sum of squares of errors on a grid, under their conditions.
 
-    `wanted`: response by frequency, by default that of the Legendre coefficients.
+    `wanted`: for each degree the response by frequency.
     """
     count, powers = shape.samples, shape.conditions
     scaled = [(w * square) >> BITS for w, square in zip(weights, grid.squares(), strict=True)]
@@ -78,30 +93,29 @@ def least_squares(
         [*(lags[abs(i - j)] for j in range(count)), *(row[i] for row in rows)] for i in range(count)
     ] + [[*row, *[REAL.mpf(0)] * powers] for row in rows]
     rights = [
-        _products(grid, shape, m, weights, grid.bessel(m) if wanted is None else wanted)
-        + [REAL.mpf(r.numerator) / r.denominator for r in window_conditions.coefficients(m, powers)]
-        for m in degrees
+        _products(grid, shape, weights, response)
+        + [REAL.mpf(r.numerator) / r.denominator for r in shape.right(m)]
+        for m, response in zip(degrees, wanted, strict=True)
     ]
     return [solution[:count] for solution in solve(matrix, rights)]
 
 
 def _products(
-    grid: BandGrid, shape: Shape, m: int, weights: Sequence[int], wanted: Sequence[int]
+    grid: BandGrid, shape: Shape, weights: Sequence[int], wanted: Sequence[tuple[int, int]]
 ) -> list[Any]:
     """Return the products of the functions of the samples with a response."""
-    right = [(w * value) >> BITS for w, value in zip(weights, wanted, strict=True)]
-    re = [(x * value) >> BITS for (x, _), value in zip(grid.gains, right, strict=True)]
-    im = [(y * value) >> BITS for (_, y), value in zip(grid.gains, right, strict=True)]
+    parts = [
+        (x, y, w * p >> BITS, w * q >> BITS)
+        for w, (x, y), (p, q) in zip(weights, grid.gains, wanted, strict=True)
+    ]
+    even = [(x * p + y * q) >> BITS for x, y, p, q in parts]
+    odd = [(x * q - y * p) >> BITS for x, y, p, q in parts]
     result = []
     for place in range(shape.samples):
         number, after = distance(place, shape.twice_middle)
         cosines = [row[number] for row in grid.cosines]
         sines = [row[number] if after else -row[number] for row in grid.sines]
-        if m % 2:
-            total = sum(map(mul, re, sines)) + sum(map(mul, im, cosines))
-        else:
-            total = sum(map(mul, re, cosines)) - sum(map(mul, im, sines))
-        result.append(real(total >> BITS))
+        result.append(real((sum(map(mul, even, cosines)) + sum(map(mul, odd, sines))) >> BITS))
     return result
 
 
@@ -142,25 +156,34 @@ ROUNDS = 60
 _LEAST_WEIGHT = ONE // 10**12
 
 
-def lawson_filters(shape: Shape, degrees: Sequence[int], band: Fraction) -> list[list[Any]]:
+def lawson_filters(
+    shape: Shape, degrees: Sequence[int], band: Fraction, lever: Taps | None = None
+) -> list[list[Any]]:
     """Return filters with the least largest errors over a band, of those that the iteration passes.
 
-    `band`: highest angular frequency in rad a sample; the errors are those at `band_grid.mean_points`.
+    `band`: highest angular frequency in rad a sample; the errors are those at `band_grid.mean_points`. `lever`: v of a
+    pair whose u this is; the error is that of their product.
 
     >>> taps, = lawson_filters(Shape(1, 1, 3), [1], Fraction(1))
     >>> [round(float(tap), 12) for tap in taps]
     [-0.25, 0.0, 0.25]
     """
-    return [_filter(shape, m, band) for m in degrees]
+    return [_filter(shape, m, band, lever) for m in degrees]
 
 
-def _filter(shape: Shape, m: int, band: Fraction) -> list[Any]:
-    grid = mean_grid(band, shape.samples - 1, shape.gyro, shape.increments)
+def _filter(shape: Shape, m: int, band: Fraction, lever: Taps | None) -> list[Any]:
+    grid = _grid(shape, band, lever)
     weights = [ONE // len(grid.points)] * len(grid.points)
+    levers = [ONE] * len(weights)
+    if lever is not None:
+        levers = [magnitude(*one) for one in grid.response(list(map(integer, lever)))]
+    wanted = _wanted(grid, shape, m, lever)
     best: tuple[int, list[Any]] | None = None
     for _ in range(ROUNDS):
-        (taps,) = least_squares(grid, shape, [m], weights)
-        errors = [magnitude(*e) for e in grid.errors(m, list(map(integer, taps)), shape.previous)]
+        scaled = [w * v * v >> 2 * BITS for w, v in zip(weights, levers, strict=True)]
+        (taps,) = least_squares(grid, shape, [m], [wanted], scaled)
+        found = zip(levers, grid.response(list(map(integer, taps)), shape.previous), wanted, strict=True)
+        errors = [v * magnitude(x - p, y - q) >> BITS for v, (x, y), (p, q) in found]
         if best is None or max(errors) < best[0]:
             best = max(errors), taps
         products = [w * e >> BITS for w, e in zip(weights, errors, strict=True)]

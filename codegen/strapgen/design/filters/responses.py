@@ -32,7 +32,7 @@ _GAIN_POINTS = 2000
 def level(window: Window, m: int) -> float:
     """Return the largest error of a filter over its band, for each unit of rate times the sampling interval.
 
-    That of F_1 of a pair is of the product with F_2/30 - F_0/6, for each unit squared.
+    That of u of a pair is of its product with v, for each unit squared.
 
     >>> from strapgen.catalogue.methods.windows import WINDOWS
     >>> f"{level(WINDOWS['window-3-3'], 1):.6e}"
@@ -111,9 +111,9 @@ def polynomial_fit(window: Window) -> tuple[tuple[Fraction, ...], ...]:
 
 def _filter(window: Window, m: int) -> tuple[int, list[int], int, list[int] | None]:
     """Return the arguments of `BandGrid.errors` for a filter."""
-    second = window.partner(m)
-    taps, other = ([integer(tap) for tap in row or ()] for row in (window.filters[m], second))
-    return m, taps, window.previous, other if second else None
+    lever = window.partner(m)
+    taps, other = ([integer(tap) for tap in row or ()] for row in (window.filters[m], lever))
+    return m, taps, window.previous, other if lever else None
 
 
 #: Binary digits of a density by its mean. Its last digits in double precision depend on the machine; these do not.

@@ -234,8 +234,8 @@ def choice_of(candidate: Candidate, state: str, path: str) -> Choice:
 def contenders(brief: DesignBrief, names: Iterable[str] | None = None) -> list[Candidate]:
     """Return the algorithms for a brief; of two speeds the increments are the fast cycles in a slow one.
 
-    Coefficients are designed where the vibration has a spectrum that turns about two axes, and filters where it has a
-    band: windows, and pairs for a gyro whose samples are integrals of the rate.
+    Coefficients are designed where the vibration has a spectrum that turns about two axes, and filters, windows and
+    pairs, where it has a band.
 
     >>> from fractions import Fraction
     >>> from strapgen.design.brief import BudgetBrief, GyroBrief, ProcessorBrief
@@ -256,8 +256,7 @@ def contenders(brief: DesignBrief, names: Iterable[str] | None = None) -> list[C
             Candidate(f"{TUNED}{objective}", *samples) for objective in _OBJECTIVES for samples in _DESIGNED
         ]
     if _band(brief) is not None:
-        forms = FORMS if brief.gyro.seen is None else FORMS[:1]
-        several += [Candidate(f"{TUNED}{form}", *samples) for form in forms for samples in _FILTERS[form]]
+        several += [Candidate(f"{TUNED}{form}", *samples) for form in FORMS for samples in _FILTERS[form]]
     if names is None:
         return several
     chosen: dict[Candidate, None] = {}

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from fractions import Fraction
 from pathlib import Path
 from typing import ClassVar
@@ -23,9 +23,9 @@ from numpy.typing import NDArray
 from strapgen.cli.progress import track
 from strapgen.ir.exceptions import InputError
 from strapgen.lab.sensor_error_study import deviation_interval
-from strapgen.lab.sensor_errors.instruments import InstrumentErrors, TriadErrors
+from strapgen.lab.sensor_errors.instruments import InstrumentErrors
 from strapgen.lab.sensor_errors.measured_motions import measured
-from strapgen.lab.sensor_errors.sensor_covariance import single_constants
+from strapgen.lab.sensor_errors.sensor_covariance import single_units
 from strapgen.lab.sensor_errors.sensors import MeasurementUnit
 from strapgen.navigation.systems.system_flight import fly, local_axes
 from strapgen.navigation.systems.system_runner import SystemRunner
@@ -38,6 +38,8 @@ Array = NDArray[np.float64]
 
 #: Causes whose covariance is known here.
 CAUSES = ("bias", "scale", "misalignment", "terms", "noise", "random walk")
+#: Those of them that differ from run to run even if constants are not drawn.
+RANDOM = CAUSES[4:]
 #: Longest interval of the covariance in s, and the largest angle of the body in one, in rad.
 _LONGEST, _LARGEST = 1.0, 0.05
 #: States: epsilon, u, theta, and the walking biases of gyros and accelerometers.
@@ -84,23 +86,20 @@ def spread(
     for cause in errors.causes:
         if cause not in CAUSES:
             raise InputError(f"errors of kind {cause} have no covariance here; {', '.join(CAUSES)} have one")
+    if not {*errors.causes} & {*(CAUSES if errors.drawn else RANDOM)}:
+        raise InputError(
+            'the sensors are the same in every run; constants = "drawn", noise or a random walk is needed'
+        )
     path = _Path(motion, duration, records)
     covariances: dict[str, Array] = {}
     for cause in errors.causes:
         alone = errors.only(cause)
-        if cause in ("noise", "random walk"):
+        if cause in RANDOM:
             covariances[cause] = path.of_noise(alone)
         else:
-            singles = _singles(alone) if errors.drawn else []
-            covariances[cause] = path.of_constants(alone, singles, align)
+            singles = single_units(alone) if errors.drawn else []
+            covariances[cause] = path.of_constants(singles, align)
     return Spread(path.times, covariances)
-
-
-def _singles(errors: InstrumentErrors) -> list[InstrumentErrors]:
-    """Return each constant of both triads alone."""
-    nothing = replace(errors, gyro=TriadErrors(), accelerometer=TriadErrors(), drawn=False)
-    gyros = [replace(nothing, gyro=one) for one in single_constants(errors.gyro)]
-    return gyros + [replace(nothing, accelerometer=one) for one in single_constants(errors.accelerometer)]
 
 
 def _cross(vectors: Array) -> Array:
@@ -185,9 +184,7 @@ class _Path:
                 rows.append(state)
         return self._seen(np.array(rows))
 
-    def of_constants(
-        self, errors: InstrumentErrors, singles: Sequence[InstrumentErrors], align: bool
-    ) -> Array:
+    def of_constants(self, singles: Sequence[InstrumentErrors], align: bool) -> Array:
         """Return the covariance by constants that every run draws: the squares of what each of them does."""
         if not singles:
             return np.zeros((self.records, len(_QUANTITIES), len(_QUANTITIES)))

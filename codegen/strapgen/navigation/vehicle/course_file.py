@@ -73,10 +73,13 @@ class CourseFile:
         start = self.start
         legs = Legs.begun(start.speed_m_s, math.radians(start.heading_deg))
         for number, leg in enumerate(self.leg, 1):
+            begun = legs.time
             try:
                 _go(legs, leg, start.height_m)
             except InputError as error:
                 raise InputError(f"leg {number}: {error}") from None
+            if legs.time == begun:
+                raise InputError(f"leg {number}: this {leg.kind} changes nothing; leave it out")
         place = math.radians(start.latitude_deg), math.radians(start.longitude_deg)
         return over_earth(name, *place, start.height_m, legs.controls)
 

@@ -273,11 +273,16 @@ class VehicleMotion(Motion):
         Gauss's rule integrates each cycle in parts that end at the edges of the controls, with enough nodes for the
         highest frequency of a vibration.
         """
-        asked = interval, first, stop
-        if asked not in self._sampled:
-            self._sampled.clear()  # runs on other sensors ask for the same samples again
-            self._sampled[asked] = self._both_samples(*asked)
-        return self._sampled[asked]
+        for (
+            cycle,
+            begin,
+            end,
+        ), held in self._sampled.items():  # runs on other sensors ask for the same again
+            if cycle == interval and begin <= first <= stop <= end:
+                return held[0][first - begin : stop - begin], held[1][first - begin : stop - begin]
+        self._sampled.clear()
+        self._sampled[interval, first, stop] = both = self._both_samples(interval, first, stop)
+        return both
 
     @cached_property
     def _sampled(self) -> dict[tuple[Fraction, int, int], tuple[Array, Array]]:
