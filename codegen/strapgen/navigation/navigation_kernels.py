@@ -173,6 +173,12 @@ OUTPUTS = {
     },
 }
 
+#: Kernels of the modes of a reference.
+MODES = {
+    "hysteresis": _recipe("switch with two thresholds", "modes", "hysteresis"),
+    "mode-sequence": _recipe("sequence of off, align, navigate, attitude", "modes", "mode_sequence"),
+}
+
 #: Kernels of an attitude held as two rows of its direction cosine matrix.
 TWO_ROWS = {
     "dcm-two-rows-update": _recipe("two rows: update by a rotation vector", _STEPS, "update"),
@@ -207,6 +213,7 @@ KERNELS = {
     **NAVIGATION,
     **REDUNDANCY,
     **OUTPUTS,
+    **MODES,
     **TWO_ROWS,
     **LOOPS,
 }
