@@ -131,6 +131,8 @@ def share_of_range(kernel: str, signal: str, states: list[str]) -> Fraction:
     """Return how much of the range of an input is proper."""
     if kernel in LOOPS and signal in ("k1", "k2", "k3"):  # gains are for small errors
         return Fraction(1, 1 << 14)
+    if kernel == "tuned-rotor-loop" and signal not in ("turn", "share"):  # small angles, whatever the turn
+        return Fraction(1, 16)
     if kernel in LOOPS and (signal in states or signal.startswith(("reference", "magnetic"))):
         return Fraction(1, 4)  # no corner has two headings half a turn apart, where the error jumps
     if signal in ("sample", "first", "second", "sensed"):
