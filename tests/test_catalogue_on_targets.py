@@ -76,6 +76,7 @@ COMPILED = (
 RANGES = {
     "butterworth-2": {"sample": Fraction(128), "first": Fraction(128), "second": Fraction(192)},
     **{f"axes-{mounting}": {"sensed": Fraction(128)} for mounting in MOUNTINGS},
+    "median-3": {name: Fraction(128) for name in ("unit_1", "unit_2", "unit_3", "trip")},
     "velocity-position": {"velocity_increments": Fraction(1, 2)},
     **{name: {"cycle": Fraction(1, 50)} for name in TRANSLATIONS},
 }
@@ -115,6 +116,9 @@ def proper_inputs(name: str, evaluator: Evaluator, count: int, rng: np.random.Ge
         speed, heading = (inputs[place].astype(float) * units[place] for place in (1, 2))
         calm = np.concatenate([speed * np.cos(heading), speed * np.sin(heading), 0 * speed], axis=1)
         inputs[0] = np.rint(calm / units[0]).astype(evaluator.number)
+    if name == "lock-in-errors":  # the end of the zone, where the root of what is left is nearly nothing
+        zone = inputs[2].astype(float) * units[2] * inputs[1] * units[1]
+        inputs[0] = (np.rint(zone / units[0]) + rng.integers(-3, 4, zone.shape)).astype(evaluator.number)
     if "row_1" in names:
         rows = np.linalg.qr(rng.normal(size=(count, 3, 2)))[0]
         inputs[:2] = [np.rint(rows[:, :, k] / units[0]).astype(evaluator.number) for k in range(2)]
@@ -326,6 +330,7 @@ def test_numpy_is_generated(choice):
 #: Inputs that have no frame.
 NO_FRAME = (
     *("cycle", "cycle_rate", "decay", "unbalance", "unbalance_reciprocal", "deviation", "heating_gain"),
+    *("phase_scale", "phase_scale_reciprocal"),
     *("nominal", "slope_above", "slope_below", "difference"),
 )
 

@@ -149,7 +149,11 @@ WRONG = {
             ("bank_deg = 25", "bank_deg = 89", "bank_deg is 89; a number above 0 and of at most 80"),
             ("height_m = 600", "height_m = 70000", "height_m is 70000"),
             ("speed_m_s = 80", "speed_m_s = 2000", "speed_m_s is 2000"),
-            ("speed_m_s = 80", "speed_m_s = 0", "leg 3: a vehicle that stands does not climb; accelerate first"),
+            ("speed_m_s = 80", "speed_m_s = 0", "leg 2: this accelerate changes nothing; leave it out"),
+            (
+                'kind = "accelerate"\nspeed_m_s = 80\nacceleration_m_s2 = 2.5', 'kind = "hold"\nduration_s = 1',
+                "leg 3: a vehicle that stands does not climb; accelerate first",
+            ),
             ("acceleration_m_s2 = 2\n", "acceleration_m_s2 = 0\n", "acceleration_m_s2 is 0"),
             ("[start]", "[begin]", "key 'begin' is not known"),
         ],
@@ -265,6 +269,7 @@ WRONG = {
             ("rate_sigma_deg_h", "rate_sigma_deg_s", "key 'rate_sigma_deg_s' is not known (did you mean"),
             ("[0, 1, 0]", "[0, 1]", "positions[1] has 2 entries; 3 are needed"),
             ("[0, 1, 0]", "[0, 2, 0]", "positions[1] has the length 2; 1 is needed"),
+            ("positions = [", "pause_s = -1\npositions = [", "pause_s is -1; a whole number from 0 to 100000 in s"),
         ],
     ),
     "variants": (

@@ -283,8 +283,10 @@ class MethodOptions:
         Path | None,
         option(
             "--layout",
+            "--field",
             metavar="FILE",
-            help="TOML file with the layout of gyros for the kernels separate and measure.",
+            help="File of a kernel that is made from one: TOML with the layout of gyros for separate and torques, the "
+            "coefficients of a World Magnetic Model (.COF) for magnetic-field, which --field names too.",
         ),
     ] = None
 

@@ -44,6 +44,16 @@ _Aligned = Annotated[
         panel="Input",
     ),
 ]
+_Runs = Annotated[
+    int,
+    option(
+        "--runs",
+        metavar="N",
+        help="Runs, each with numbers of its own.",
+        panel="Run",
+        read=whole(10, 10**5),
+    ),
+]
 
 
 @grouped
@@ -135,16 +145,7 @@ def study_flight_errors(
     sample_hz: _SampleRate = None,
     errors: SensorFile = None,
     aligned: _Aligned = False,
-    runs: Annotated[
-        int,
-        option(
-            "--runs",
-            metavar="N",
-            help="Runs, each with numbers of its own.",
-            panel="Run",
-            read=whole(10, 10**5),
-        ),
-    ] = 200,
+    runs: _Runs = 200,
     backend: OneBackend = "c",
     output: Output,
 ) -> None:
@@ -372,11 +373,24 @@ def study_redundancy(
 
 
 @grouped
+@rules(Needs("--errors-per-degree --runs", "--errors"))
 def study_calibration(
     file: Annotated[
-        Path, typer.Argument(metavar="FILE", help="TOML file with the positions.", show_default=False)
+        Path,
+        typer.Argument(metavar="FILE", help="TOML file with positions and turns.", show_default=False),
     ],
     *,
+    errors: SensorFile = None,
+    errors_per_degree: Annotated[
+        str | None,
+        option(
+            "--errors-per-degree",
+            metavar="FILE",
+            help="TOML file of sensor errors that come in by a degree of temperature.",
+            panel="Input",
+        ),
+    ] = None,
+    runs: _Runs = 200,
     rate_deg_s: Annotated[
         Vector | None,
         option(
@@ -394,20 +408,28 @@ def study_calibration(
     ] = None,
     output: Output,
 ) -> None:
-    """Show which error coefficients of an IMU a set of calibration positions determines, and how accurately.
+    """Show which error coefficients of an IMU a calibration determines, and how accurately.
 
-    In each position the errors of rate and acceleration are measured at rest. You see the exact rank, combinations of
-    coefficients that cannot be observed, and the standard deviation of every other coefficient by least squares; with
-    measured errors in the file, the estimates as well.
+    The errors of rate and acceleration are measured at rest in positions, on a table that turns, and at temperatures.
+    You see the exact rank, combinations of coefficients that cannot be observed, and the standard deviation of every
+    other coefficient by least squares; with measured errors in the file, the estimates as well. A table with headings
+    finds north. With --errors all is run on simulated sensors, and the errors of the estimates stand beside.
 
     Example: strapgen study calibration examples/positions-20.toml --plot out/calibration.png
+
+    Example: strapgen study calibration examples/turning.toml --errors ins-1 --runs 50
     """
-    output.check(file)
+    output.check(file, errors, errors_per_degree)
     from strapgen.navigation.calibration import QUANTITIES, CalibrationResult, calibrated, read
+    from strapgen.navigation.turntable import Session, noise_rows
 
     content = read(file)
-    steps = (calibrated(content.scheme, quantity) for quantity in QUANTITIES)
-    several = list(track(steps, "solving", len(QUANTITIES)))
+    if errors_per_degree is not None and not content.temperatures_c:
+        raise InputError(f"{file}: --errors-per-degree needs temperatures_c")
+    scheme = content.scheme
+    quantities = [*QUANTITIES] if scheme.positions or scheme.turns else []
+    solved = (calibrated(scheme, quantity) for quantity in quantities)
+    several = list(track(solved, "solving", len(quantities)))
     estimates, remaining = {}, {}
     for one in several:
         if one.quantity in content.errors:
@@ -419,7 +441,12 @@ def study_calibration(
             turning = [math.radians(value) for value in rate_deg_s or (0, 0, 0)]
             covariance = one.error_covariance(turning, [*map(float, acceleration_g or (0, 0, 0))])
             remaining[one.quantity] = covariance * content.sigma[one.quantity] ** 2
-    output.show(CalibrationResult.of(content, several, estimates, remaining))
+    headings, variances, simulated = noise_rows(content), None, []
+    if sensors := read_errors(errors):
+        session = Session(content, sensors, read_errors(errors_per_degree))
+        simulated = list(track((session.run(several, number) for number in range(runs)), "running", runs))
+        headings, variances = session.heading_rows(simulated), session.variances
+    output.show(CalibrationResult.of(content, several, estimates, remaining, headings, variances, simulated))
 
 
 @grouped
