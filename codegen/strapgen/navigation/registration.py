@@ -30,7 +30,7 @@ REGISTRATION = Registration(
         "kalman": Command(
             f"{__package__}.kalman.kalman_command:kalman",
             "Generate",
-            summary="Derive a Kalman filter from its description and generate its code",
+            summary="Generate a Kalman filter from its description",
         ),
         "strapdown": Command(
             f"{__package__}.strapdown_command:strapdown",
