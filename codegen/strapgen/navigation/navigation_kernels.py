@@ -100,6 +100,16 @@ LAYOUTS = {
     ),
 }
 
+#: The kernel of a filter that a file describes.
+FILTERS = {
+    "filter": _recipe(
+        "lag, lead-lag, notch, low pass or cascade, of a filter file",
+        "filters.filter_kernels",
+        "cascade",
+        reader="strapgen.navigation.filters.filter_file:read",
+    ),
+}
+
 _RATES, _STEPS, _GEOGRAPHIC = "frame.frame_rates", "frame.navigation_steps", "frame.geographic"
 #: Kernels of the navigation frame: its rate, gravity, velocity and position, and its alignment.
 NAVIGATION = {
@@ -156,7 +166,7 @@ REDUNDANCY = {
 
 #: Kernels of what a navigator shows: filtered rates, magnetic heading, track angle, axes.
 OUTPUTS = {
-    "butterworth-2": _recipe("low-pass filter of second order", "outputs", "butterworth"),
+    "butterworth-2": _recipe("low-pass filter of second order", "filters.filter_kernels", "butterworth"),
     "variation": _recipe("magnetic variation between four points", "outputs", "variation"),
     "magnetic-heading": _recipe("heading by the magnetic variation", "outputs", "magnetic_heading"),
     "track-angle": _recipe("direction of the ground velocity", "outputs", "track_angle"),
@@ -213,6 +223,7 @@ KERNELS = {
     **TWO_SPEED_LOOPS,
     **COMPENSATION,
     **LAYOUTS,
+    **FILTERS,
     **NAVIGATION,
     **REDUNDANCY,
     **OUTPUTS,
