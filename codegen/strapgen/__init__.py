@@ -16,7 +16,7 @@ Functions take the object, a name or a Choice alike:
   recordings  read, Recording, StampedGrid, propagate; rests, TrueAttitude, time_offset, attitude_error
   judgement   compare, converge, certify, certify_system, check, rounding_bounds; unknowns, vibration, study
   your own    KernelBuilder, Signal, Stage, algebra, tableaux, windows, window_design; Target, Language
-  navigation  read_system, system_runner, course, TwoSpeed, CommitLate, recording_attitudes, Preintegrator
+  navigation  read_system, system_runner, course, kalman, TwoSpeed, CommitLate, recording_attitudes, Preintegrator
   notebooks   formulas; to_rotation and from_rotation; plot, to_pandas and to_xarray of what runs return
 
 SI units and rad, unless a name says otherwise; matrices lead from body to reference axes. Wrong input raises a
@@ -115,6 +115,8 @@ if _typing.TYPE_CHECKING:
     from strapgen.lab.scipy_rotations import to_rotation as to_rotation
     from strapgen.navigation.courses import Course as Course
     from strapgen.navigation.courses import course as course
+    from strapgen.navigation.kalman.kalman_filter import KalmanFilter as KalmanFilter
+    from strapgen.navigation.kalman.kalman_filter import kalman as kalman
     from strapgen.navigation.preintegration.preintegrator import Preintegrated as Preintegrated
     from strapgen.navigation.preintegration.preintegrator import PreintegrationError as PreintegrationError
     from strapgen.navigation.preintegration.preintegrator import PreintegrationStatus as PreintegrationStatus
@@ -180,6 +182,10 @@ _NAMES = {
         "PreintegrationError",
         "PreintegrationStatus",
         "Preintegrator",
+    ),
+    "navigation.kalman.kalman_filter": (
+        "KalmanFilter",
+        "kalman",
     ),
     "navigation.systems.system_certificate": ("certify_system",),
     "navigation.systems.system_runner": (

@@ -101,7 +101,7 @@ SECTIONS = (
         "Navigation",
         "docs/two-speed.md",
         "You follow NATO's lectures on strapdown systems, AGARD 133 of 1984, up to a whole navigator in C.",
-        _docs("navigation", "preintegration", "compensation", "ahrs", "systems", "flights"),
+        _docs("navigation", "preintegration", "compensation", "ahrs", "systems", "kalman", "flights"),
     ),
     Section(
         "Reference",

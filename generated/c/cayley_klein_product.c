@@ -9,13 +9,44 @@
 #if (FLT_RADIX != 2) || (DBL_MANT_DIG != 53)
 #error "double must be the type of IEC 60559 with 53 bits"
 #endif
-#if (FLT_EVAL_METHOD != 0) || defined(__FAST_MATH__)
-#error "operations must round to double: -msse2 -mfpmath=sse on x86, never -ffast-math"
+#if (FLT_EVAL_METHOD != 0) && !(defined(__FAST_MATH__) && (FLT_EVAL_METHOD < 0))
+#error "operations must round to double: -msse2 -mfpmath=sse on x86"
+#endif
+#if defined(__FAST_MATH__)
+#include <stdint.h>
+#include <string.h>
+
+/* Whether one of some numbers is not finite, by its bits: compilers take comparisons for known. */
+static int cayley_klein_product_nf_(const double *place, int count)
+{
+    for (int k = 0; k < count; ++k) {
+        uint64_t bits;
+        memcpy(&bits, place + k, sizeof bits);
+        if ((bits & UINT64_C(0x7fffffffffffffff)) >= UINT64_C(0x7ff0000000000000))
+            return 1;
+    }
+    return 0;
+}
+
+/* Sets numbers to NaN. */
+static void cayley_klein_product_nan_(double *place, int count)
+{
+    const uint64_t bits = UINT64_C(0x7ff8000000000000);
+    for (int k = 0; k < count; ++k)
+        memcpy(place + k, &bits, sizeof bits);
+}
 #endif
 
 
 void cayley_klein_product(const double state[4], const double transition[4], double next[4])
 {
+#if defined(__FAST_MATH__)
+    if (cayley_klein_product_nf_(state, 4)
+        || cayley_klein_product_nf_(transition, 4)) {
+        cayley_klein_product_nan_(next, 4);
+        return;
+    }
+#endif
     const double a_s = state[0];
     const double a_x = state[1];
     const double a_y = state[2];

@@ -9,8 +9,32 @@
 #if (FLT_RADIX != 2) || (DBL_MANT_DIG != 53)
 #error "double must be the type of IEC 60559 with 53 bits"
 #endif
-#if (FLT_EVAL_METHOD != 0) || defined(__FAST_MATH__)
-#error "operations must round to double: -msse2 -mfpmath=sse on x86, never -ffast-math"
+#if (FLT_EVAL_METHOD != 0) && !(defined(__FAST_MATH__) && (FLT_EVAL_METHOD < 0))
+#error "operations must round to double: -msse2 -mfpmath=sse on x86"
+#endif
+#if defined(__FAST_MATH__)
+#include <stdint.h>
+#include <string.h>
+
+/* Whether one of some numbers is not finite, by its bits: compilers take comparisons for known. */
+static int coning_fast_nf_(const double *place, int count)
+{
+    for (int k = 0; k < count; ++k) {
+        uint64_t bits;
+        memcpy(&bits, place + k, sizeof bits);
+        if ((bits & UINT64_C(0x7fffffffffffffff)) >= UINT64_C(0x7ff0000000000000))
+            return 1;
+    }
+    return 0;
+}
+
+/* Sets numbers to NaN. */
+static void coning_fast_nan_(double *place, int count)
+{
+    const uint64_t bits = UINT64_C(0x7ff8000000000000);
+    for (int k = 0; k < count; ++k)
+        memcpy(place + k, &bits, sizeof bits);
+}
 #endif
 
 
@@ -18,6 +42,17 @@ void coning_fast(const double angle_sum[3], const double coning[3],
     const double previous_increment[3], const double increment[3], double next_angle_sum[3],
     double next_coning[3], double next_previous_increment[3])
 {
+#if defined(__FAST_MATH__)
+    if (coning_fast_nf_(angle_sum, 3)
+        || coning_fast_nf_(coning, 3)
+        || coning_fast_nf_(previous_increment, 3)
+        || coning_fast_nf_(increment, 3)) {
+        coning_fast_nan_(next_angle_sum, 3);
+        coning_fast_nan_(next_coning, 3);
+        coning_fast_nan_(next_previous_increment, 3);
+        return;
+    }
+#endif
     const double beta_x = angle_sum[0];
     const double beta_y = angle_sum[1];
     const double beta_z = angle_sum[2];

@@ -9,13 +9,44 @@
 #if (FLT_RADIX != 2) || (FLT_MANT_DIG != 24)
 #error "float must be the type of IEC 60559 with 24 bits"
 #endif
-#if (FLT_EVAL_METHOD != 0) || defined(__FAST_MATH__)
-#error "operations must round to float: -msse2 -mfpmath=sse on x86, never -ffast-math"
+#if (FLT_EVAL_METHOD != 0) && !(defined(__FAST_MATH__) && (FLT_EVAL_METHOD < 0))
+#error "operations must round to float: -msse2 -mfpmath=sse on x86"
+#endif
+#if defined(__FAST_MATH__)
+#include <stdint.h>
+#include <string.h>
+
+/* Whether one of some numbers is not finite, by its bits: compilers take comparisons for known. */
+static int cayley_klein_rk2_2_float_nf_(const float *place, int count)
+{
+    for (int k = 0; k < count; ++k) {
+        uint32_t bits;
+        memcpy(&bits, place + k, sizeof bits);
+        if ((bits & UINT32_C(0x7fffffff)) >= UINT32_C(0x7f800000))
+            return 1;
+    }
+    return 0;
+}
+
+/* Sets numbers to NaN. */
+static void cayley_klein_rk2_2_float_nan_(float *place, int count)
+{
+    const uint32_t bits = UINT32_C(0x7fc00000);
+    for (int k = 0; k < count; ++k)
+        memcpy(place + k, &bits, sizeof bits);
+}
 #endif
 
 
 void cayley_klein_rk2_2_float(const float state[4], const float increments[6], float next[4])
 {
+#if defined(__FAST_MATH__)
+    if (cayley_klein_rk2_2_float_nf_(state, 4)
+        || cayley_klein_rk2_2_float_nf_(increments, 6)) {
+        cayley_klein_rk2_2_float_nan_(next, 4);
+        return;
+    }
+#endif
     const float a_s = state[0];
     const float a_x = state[1];
     const float a_y = state[2];

@@ -9,8 +9,32 @@
 #if (FLT_RADIX != 2) || (FLT_MANT_DIG != 24)
 #error "float must be the type of IEC 60559 with 24 bits"
 #endif
-#if (FLT_EVAL_METHOD != 0) || defined(__FAST_MATH__)
-#error "operations must round to float: -msse2 -mfpmath=sse on x86, never -ffast-math"
+#if (FLT_EVAL_METHOD != 0) && !(defined(__FAST_MATH__) && (FLT_EVAL_METHOD < 0))
+#error "operations must round to float: -msse2 -mfpmath=sse on x86"
+#endif
+#if defined(__FAST_MATH__)
+#include <stdint.h>
+#include <string.h>
+
+/* Whether one of some numbers is not finite, by its bits: compilers take comparisons for known. */
+static int coning_fast_float_nf_(const float *place, int count)
+{
+    for (int k = 0; k < count; ++k) {
+        uint32_t bits;
+        memcpy(&bits, place + k, sizeof bits);
+        if ((bits & UINT32_C(0x7fffffff)) >= UINT32_C(0x7f800000))
+            return 1;
+    }
+    return 0;
+}
+
+/* Sets numbers to NaN. */
+static void coning_fast_float_nan_(float *place, int count)
+{
+    const uint32_t bits = UINT32_C(0x7fc00000);
+    for (int k = 0; k < count; ++k)
+        memcpy(place + k, &bits, sizeof bits);
+}
 #endif
 
 
@@ -18,6 +42,17 @@ void coning_fast_float(const float angle_sum[3], const float coning[3],
     const float previous_increment[3], const float increment[3], float next_angle_sum[3],
     float next_coning[3], float next_previous_increment[3])
 {
+#if defined(__FAST_MATH__)
+    if (coning_fast_float_nf_(angle_sum, 3)
+        || coning_fast_float_nf_(coning, 3)
+        || coning_fast_float_nf_(previous_increment, 3)
+        || coning_fast_float_nf_(increment, 3)) {
+        coning_fast_float_nan_(next_angle_sum, 3);
+        coning_fast_float_nan_(next_coning, 3);
+        coning_fast_float_nan_(next_previous_increment, 3);
+        return;
+    }
+#endif
     const float beta_x = angle_sum[0];
     const float beta_y = angle_sum[1];
     const float beta_z = angle_sum[2];

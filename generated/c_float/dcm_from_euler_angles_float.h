@@ -11,6 +11,7 @@
  * Rounding: against exact arithmetic on the same inputs, error of attitude <= 5.96047e-07
  *     (5.00001 ulp of 1). This holds for angles up to 3.14159; cos and sin of the C library
  *     within 1 ulp; IEEE 754, each operation rounded to the nearest; -ffp-contract=off.
+ * With -ffast-math: refused; there is no bound for cosines.
  *
  * No heap, no global state, reentrant. In one call every input is read before any output is
  * written: an output may be the same memory as an input. Matrices are stored by rows.

@@ -12,6 +12,7 @@
  *     ulp of 1). This holds for state up to 1.0625; rotation_vector up to 1; sin of the C
  *     library within 1 ulp; IEEE 754, each operation rounded to the nearest;
  *     -ffp-contract=off.
+ * With -ffast-math: refused; there is no bound for roots near zero.
  *
  * No heap, no global state, reentrant. In one call every input is read before any output is
  * written: an output may be the same memory as an input. Matrices are stored by rows.

@@ -12,6 +12,10 @@
  *     (111.251 ulp of 1). This holds for state up to 1.0625; velocity_sum up to 8; sculling up
  *     to 4; angle_sum up to 1; IEEE 754, each operation rounded to the nearest;
  *     -ffp-contract=off.
+ * With -ffast-math: error of transformed <= 0.000125394 (1051.88 ulp of 1). This holds on the
+ *     same ranges for any order of the operations, fused or not, with at most 33 roundings
+ *     from an input to an output; subnormal numbers may be flushed to zero. An input that is
+ *     not finite makes all outputs NaN.
  *
  * No heap, no global state, reentrant. In one call every input is read before any output is
  * written: an output may be the same memory as an input. Matrices are stored by rows.

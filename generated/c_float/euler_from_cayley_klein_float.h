@@ -9,6 +9,10 @@
  *     e4, a2 = e1, a3 = e2, a4 = e3.
  * Operations of one call: none; 0 temporaries.
  * Rounding: none; every output is exact.
+ * With -ffast-math: converted is exact (0 ulp of 1). This holds on the same ranges for any order
+ *     of the operations, fused or not, with at most 0 roundings from an input to an output;
+ *     subnormal numbers may be flushed to zero. An input that is not finite makes all outputs
+ *     NaN.
  *
  * No heap, no global state, reentrant. In one call every input is read before any output is
  * written: an output may be the same memory as an input. Matrices are stored by rows.

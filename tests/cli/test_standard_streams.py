@@ -48,6 +48,7 @@ def said(monkeypatch, capsys):
         ("window show {}", METHODS / "window_filters/window-3-3.toml"),
         ("system {}", EXAMPLES / "attitude.toml"),
         ("redundancy {}", EXAMPLES / "hexad.toml"),
+        ("kalman {}", EXAMPLES / "kalman/gyrocompass.toml"),
         ("vibration euler --step 0.005 --spectrum {}", EXAMPLES / "vibration.csv"),
         ("derive torques --layout {}", EXAMPLES / "layouts/turned.toml"),
     ],

@@ -378,7 +378,7 @@ def test_the_right_example_passes(check):
     assert "FAILS" not in printed and "cause" not in printed
     assert re.search(
         r"^  holds drift +9\.783 deg/h \(0, 9\.781, 0\.1707 about x, y, z\) on a cone of 1 deg at 10 Hz about y, "
-        r"samples at 100 Hz; closed form on 1 sample and 1 before 9\.784, coning-\w+ 9\.783$",
+        r"samples at 100 Hz; closed form on 1 sample and 1 before 9\.784, coning-\w+ 9\.783; limit 11\.74$",
         printed,
         re.M,
     )

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 import shlex
+from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
@@ -369,6 +370,19 @@ READ = [
         "q: state[4], d_angle: increments[2][3] in rad) -> next[4]",
     ),
     (
+        "void f(float gx, float gy, float gz, float dt, float *q0, float *q1, float *q2, float *q3);",
+        "gx, gy, gz: rates[3] in rad/s, means, dt, q0, q1, q2, q3: state[4]) -> state[4]",
+    ),
+    (
+        "void f(double q0, double q1, double q2, double q3, const double dtheta[3], double *out0, double *out1, "
+        "double *out2, double *out3);",
+        "q0, q1, q2, q3: state[4], dtheta: increments[3] in rad, out0, out1, out2, out3: next[4]) -> next[4]",
+    ),
+    (
+        "typedef struct { double bias, w, x, y, z; } m; void f(m *self, double p, double q, double r, double dt);",
+        "self: memory, p, q, r: rates[3] in rad/s, means, dt) -> self.w x y z[4]",
+    ),
+    (
         "void f(const double gyro[3], double dt, double rotation_vector[3]);",
         "gyro: rates[3] in rad/s, means, dt, rotation_vector: rotation[3]) -> rotation[3]",
     ),
@@ -542,6 +556,123 @@ def test_integers_that_overflow_in_a_fast_motion_are_seen(outcome, angle, cause)
         ["fast"] if cause else []
     )
     assert checked.cause == cause
+
+
+#: Takes an angle of so many counts for a larger one, in one direction or in both.
+CLAMPED = "(int64_t)(delta_angle[i] {} ? {} : delta_angle[i]) << 8"
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(
+    ("part", "is_below", "holds"), [(0.96, False, True), (0.9, False, False), (0.9, True, False)]
+)
+def test_integers_that_miss_a_small_part_of_a_fast_rotation(outcome, part, is_below, holds):
+    counts = int(0.3 * part * 2**22)  # 0.3 rad is that of 30 rad/s
+    angle = CLAMPED.format(f"< -{counts}", -counts) if is_below else CLAMPED.format(f"> {counts}", counts)
+    text = INTEGER.replace("FACTOR", "1").replace("(int64_t)delta_angle[i] << 8", angle)
+    checked = outcome(text, init="begin", angle_unit=2.0**-22, state_bits=30)
+    assert [each.holds for each in checked.findings if each.name == "fast"] == [holds]
+
+
+def test_separate_pointers_get_the_attitude(tmp_path):
+    (tmp_path / "a.c").write_text(
+        "void f(double *q0, double *q1, double *q2, double *q3, const double dtheta[3])\n"
+        "{ *q0 += dtheta[0]; *q1 += 2 * *q0; *q2 = *q3; }\n"
+    )
+    for text in (None, "state, increments -> state"):
+        step = ForeignStep(read_source(tmp_path / "a.c", "f", text))
+        (done,) = step.run([Segment(np.full((2, 1, 3), 0.5), settled=False)]).segments
+        np.testing.assert_array_equal(done.states, [[0.5, 1, 1, 1], [1, 3, 1, 1]])
+
+
+@pytest.mark.parametrize(
+    ("number", "arguments", "hz", "says"),
+    [
+        (
+            "int dt",
+            None,
+            100,
+            "`int dt` is a whole number, and the interval is 0.01 s; --arguments with dt_ms or",
+        ),
+        (
+            "int dt_ms",
+            None,
+            400,
+            "`int dt_ms` is a whole number, and the interval is 2.5 ms; --sample-hz states",
+        ),
+        (
+            "unsigned n",
+            "state, rates, step -> state",
+            100,
+            "`unsigned n` is a whole number, and the interval is 0.01",
+        ),
+        ("unsigned dt_us", None, 400, None),
+        ("int dt", "state, rates, dt_ms -> state", 100, None),
+        ("int dt", None, 1, None),
+    ],
+)
+def test_an_interval_that_is_no_whole_number_is_refused(tmp_path, number, arguments, hz, says):
+    (tmp_path / "a.c").write_text(
+        f"void f(double q[4], const double gyro[3], {number}) {{ q[0] += gyro[0]; }}\n"
+    )
+    source = read_source(tmp_path / "a.c", "f", arguments)
+    if says is None:
+        assert ForeignStep(source, takes="rates", interval=Fraction(1, hz)).samples == 1
+    else:
+        with pytest.raises(InputError, match=says):
+            ForeignStep(source, takes="rates", interval=Fraction(1, hz))
+
+
+@pytest.mark.needs("g++")
+def test_memory_is_made_by_its_constructor(tmp_path):
+    (tmp_path / "a.hpp").write_text(
+        "struct Gain { explicit Gain(double k) : k(k) {} double k, q[4] = {0, 0, 0, 1};\n"
+        "    void update(const double dtheta[3]) { q[0] += k * dtheta[0]; } };\n"
+        "inline void f(Gain &gain, const double dtheta[3]) { gain.update(dtheta); }\n"
+    )
+    for function in ("Gain::update", "f"):
+        with pytest.raises(
+            InputError, match=r'Gain has no constructor without arguments; --init "Gain\(...\)" states'
+        ):
+            read_source(tmp_path / "a.hpp", function)
+        step = ForeignStep(read_source(tmp_path / "a.hpp", function, init="Gain(3)"))
+        (done,) = step.run([Segment(np.full((1, 1, 3), 0.5), settled=False)]).segments
+        np.testing.assert_array_equal(done.states, [[1.5, 0, 0, 1]])
+
+
+@pytest.mark.parametrize(
+    ("line", "differs"),
+    [
+        ("", True),
+        pytest.param("for (int i = 0; i < 3; i++) filter->last[i] = 0;", False, marks=pytest.mark.long),
+    ],
+)
+def test_what_init_leaves_of_an_earlier_run_is_a_measurement(outcome, line, differs):
+    begin = "filter->attitude.w = 1; filter->attitude.x = filter->attitude.y = filter->attitude.z = 0;"
+    text = filled(SCALARS, RIGHT).replace("filter->attitude.w = 1;", begin + line)
+    checked = outcome(text, name="filter_update", init="filter_begin")
+    said = [each for each in checked.findings if each.name == "used memory"]
+    assert (checked.holds, [each.holds for each in said]) == (True, [None] * differs)
+    assert all("filter_begin leaves something of an earlier run, by which" in each.text for each in said)
+
+
+@pytest.mark.long
+@pytest.mark.needs("g++")
+def test_a_correction_that_is_not_reset_is_named(outcome):
+    text = filled(PUBLISHES, factor("0.5", "")[0]).replace("alpha[i] = beta[i] = 0;", "alpha[i] = 0;")
+    checked = outcome(text, "rates, dt -> self.delta_angle", file="a.cpp", name="Integrator::put")
+    (said,) = (each.text for each in checked.findings if each.name == "coefficients")
+    assert (checked.cause, checked.cause_confidence) == (causes.STAYS, None)
+    assert said.endswith("with what later calls add 3.000 of what coning needs")
+
+
+def test_the_limit_of_the_drift_is_shown_and_what_rounding_hides(outcome):
+    text = filled(INTEGER, {"FACTOR": "1"})
+    checked = outcome(text, init="begin", angle_unit=2.0**-22, state_bits=30)
+    said = {each.name: each for each in checked.findings}
+    assert "rounding to int32 hides" in said["order"].text
+    limit = f"; limit {said['drift'].allowed:.4g}, of which rounding to int32 hides "
+    assert limit in said["drift"].text and said["drift"].text.endswith(", limit 11.74")
 
 
 def test_integers_are_fed_without_a_sum_of_roundings(tmp_path):

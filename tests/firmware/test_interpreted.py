@@ -60,6 +60,16 @@ class Filter:
         self.update(gyro, dt)
         return self.attitude
 
+    def by_keyword(self, gyro, *, dt):
+        self.update(gyro, dt)
+
+class Four:
+    def __init__(self):
+        self.bias, self.w, self.x, self.y, self.z = 0.0, 1.0, 0.0, 0.0, 0.0
+    def update(self, gx, gy, gz, dt=0.01, mode="plain"):
+        four = product([self.x, self.y, self.z, self.w], turn(np.array([gx, gy, gz]) * dt))
+        self.x, self.y, self.z, self.w = four
+
 class Unmade(Filter):
     def __init__(self, attitude):
         super().__init__()
@@ -130,6 +140,9 @@ def test_a_class_in_python_that_holds_its_attitude(folder, kept, cause):
     [
         ("Filter.returned", None, "", None),
         ("Unmade.returned", None, "make", None),
+        ("Four.update", None, "", causes.ABSENT),
+        ("Filter.by_keyword", "rates, dt -> self.attitude", "", None),
+        ("Filter.update", None, "", None),
         ("listed", None, "", causes.ABSENT),
         ("matrix", None, "", causes.ABSENT),
         ("flat", "state[9], increments[3] -> next[9]", "", causes.ABSENT),
@@ -140,7 +153,7 @@ def test_a_class_in_python_that_holds_its_attitude(folder, kept, cause):
 )
 def test_attitudes_are_read_in_every_shape(folder, name, arguments, init, cause):
     write()
-    takes = "rates" if "gyro" in PYTHON and "returned" in name else "increments"
+    takes = "rates" if "." in name else "increments"
     outcome = checked(f"integrators:{name}", arguments, init=init, takes=takes)
     assert (outcome.holds, outcome.cause) == (cause is None, cause)
 
@@ -158,7 +171,16 @@ def test_a_function_in_matlab(folder, factor, cause):
 def test_what_parameters_are_taken_for_is_said(folder):
     write()
     outcome = checked("integrators:listed")
-    assert "reads: listed(q: state[4], delta_angle: increments[3] in rad) -> 4 elements" in outcome.text()
+    assert "reads: listed(q: state[4], delta_angle: increments[3] in rad) -> next[4]" in outcome.text()
+    for name, reads in (
+        ("Four.update", "gx, gy, gz: rates[3] in rad/s, means, dt) -> self.w x y z[4]"),
+        ("Filter.update", "gyro: rates[3] in rad/s, means, dt) -> self.attitude[4]"),
+        ("in_place", "state: state[4], increments: increments[3] in rad) -> state[4]"),
+        ("matrix", "dcm: state[3][3], increments: increments[3] in rad) -> next[3][3]"),
+    ):
+        takes = "rates" if "." in name else "increments"
+        source = interpreted_source(f"integrators:{name}", None, None, "", "double")
+        assert ForeignStep(source, takes=takes).reading == f"reads: {name}({reads}"
 
 
 #: Functions that cannot be called as they are, or end otherwise.
@@ -189,12 +211,12 @@ REFUSED = {
     "wrong:short": "short gives an array of the shape [3]; 4 numbers are needed",
     "wrong:words": "words gives a str; 4 numbers are needed",
     "wrong:nothing": "nothing returns None; where it leaves the attitude stands behind the arrow of --arguments",
-    "wrong:other": "other(state, increments, gain): gain does not say what it is; --arguments says it",
+    "wrong:other": "other: what `gain` is, its name does not say; --arguments is needed",
     "wrong:few": "--arguments: state lack the samples",
     "broken:step": "raises ZeroDivisionError: division by zero in line 1 of broken.py",
     "needing:step": "needing imports not_there, which is not installed",
     "wrong:raises --function f": "--function f goes with a file; wrong:raises names a function already",
-    "wrong:few --arguments 'state[4], increments[3] -> state[4]'": "few(state) does not take state, increments of",
+    "wrong:few --arguments 'state[4], increments[3] -> state[4]'": "few takes no argument for increments; it takes",
     "wrong:few --increments 2": "--increments goes with an algorithm of strapgen; wrong:few is code of your own",
     "none.m": "none.m is no file",
 }

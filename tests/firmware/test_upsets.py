@@ -39,6 +39,8 @@ NORMALIZE = """
     const number l = sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
     for (int i = 0; i < 4; i++) q[i] /= l;
 """
+#: Lets the length grow by 3 units in the last place every so many calls; rounding explains 1 unit in a call.
+GROWS = "static int k; if (++k % {} == 0) for (int i = 0; i < 4; i++) q[i] *= 1 + 3.6e-7f;"
 REJECT = "for (int i = 0; i < 3; i++) if (gyro[i] != gyro[i]) return;"
 PARTS = {
     "NUMBER": "double",
@@ -104,6 +106,11 @@ def test_a_right_filter_holds_and_what_it_does_with_wrong_input_is_said(said):
             *("long run", "rounding adds up without normalization"),
             marks=pytest.mark.long,
         ),
+        pytest.param(
+            {"NUMBER": "float", "STATE": GROWS.format(4)},
+            *("long run", "rounding adds up without normalization"),
+            marks=pytest.mark.long,
+        ),
     ],
 )
 def test_what_is_no_fault_in_itself_is_a_measurement(said, parts, name, text):
@@ -136,6 +143,11 @@ def test_what_is_no_fault_in_itself_is_a_measurement(said, parts, name, text):
         pytest.param(
             {"INPUT": "if (dt < 0) for (;;) *(volatile number *)q = 0;"},
             *("dropouts", "calls have not come to an end in"),
+            marks=pytest.mark.long,
+        ),
+        pytest.param(
+            {"NUMBER": "float", "STATE": GROWS.format(2)},
+            *("long run", "the state's length is off in long runs: "),
             marks=pytest.mark.long,
         ),
         (

@@ -101,6 +101,7 @@ def failed(outcome) -> list[str]:
     return [finding.name for finding in outcome.findings if finding.holds is False]
 
 
+ONE_SIDED = "turned push,sculling,velocity order,velocity drift,position order"
 MIDDLE = "NUMBER h[4], e[3]; FOR(i) e[i] = d[i] / 2; turn(e, p); multiply(q, p, h);"
 #: What a fault replaces, the checks that fail, and the cause.
 FAULTS = {
@@ -115,6 +116,24 @@ FAULTS = {
         {"SCULLING": "1.0 / 11"},
         "sculling",
         "sculling correction 1.09 times as large as needed",
+    ),
+    "one term": ({"(a[i] + b[i])": "b[i]"}, ONE_SIDED, "and a newer j d_i x v_j is absent, v_i x d_j right"),
+    "other term": (
+        {"(a[i] + b[i])": "a[i]"},
+        ONE_SIDED,
+        "and a newer j v_i x d_j is absent, d_i x v_j right",
+    ),
+    "half a term": (
+        {"(a[i] + b[i])": "(a[i] + b[i] / 2)"},
+        *(ONE_SIDED, "v_i x d_j is 0.5 times as large as needed, d_i x v_j right"),
+    ),
+    "opposite terms": (
+        {"(a[i] + b[i])": "(a[i] - b[i])"},
+        *(ONE_SIDED, "v_i x d_j is -1 times as large as needed, d_i x v_j right"),
+    ),
+    "other products": (
+        {"(a[i] + b[i])": "(0.5 * a[i] + 2 * b[i])"},
+        *(ONE_SIDED, "of no single fault that is known, 1.25 of what sculling needs"),
     ),
     "twice": ({"HALF": "1.0"}, "turned push,velocity order,position order", said.TWICE),
     "twice by the middle": (
@@ -162,7 +181,7 @@ FAULTS = {
         "the position advances by 2 times the velocity",
     ),
 }
-OFTEN = ("no sculling", "twice", "gravity wrong", "position end")
+OFTEN = ("no sculling", "one term", "twice", "gravity wrong", "position end")
 
 
 def test_a_right_navigator_holds_and_json_has_what_is_measured(outcome):
@@ -200,6 +219,7 @@ def test_a_fault_of_the_velocity_is_seen_and_named(outcome, name):
     text = text.replace("nav->s[i] = s[i]", "nav->s[i] = s[i], nav->f[i] = f[i]") if "late" in name else text
     checked = outcome(text, ARGUMENTS, init="begin", gravity=(0, 0, -9.80665))
     assert failed(checked) == fails.split(",")
+    assert (checked.cause_confidence is not None) == checked.cause.startswith("sculling correction")
     assert checked.cause.endswith(cause) if name != "position size" else cause in checked.cause
 
 

@@ -70,6 +70,8 @@ class FloatBounds:
     functions: list[str]
     #: Error of each element of each output; None where none is known
     errors: dict[str, list[float]] | None
+    #: The same in any order of the operations, as -ffast-math allows; None where none is known
+    errors_in_any_order: dict[str, list[float]] | None
     #: What a step adds to the error of a run, and by what part the error grows
     run: dict[str, float] | None
     #: Why there is no bound

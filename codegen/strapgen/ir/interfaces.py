@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass, field, replace
 from fractions import Fraction
 from typing import Any
@@ -251,6 +251,70 @@ class StepRounding:
 
 
 @dataclass(frozen=True)
+class AnyOrder:
+    """Bounds in any order of the operations, contracted or not, with numbers near zero flushed to it or not.
+
+    Parameters
+    ----------
+    errors : mapping of str to tuple of Fraction
+        Error bound of each element by the name of the output, row-major; empty where no bound is known.
+    per_step : Fraction or None
+        The error that one call of an attitude step adds to a run; None for other kernels.
+    roundings : int
+        Number of roundings from an input to an output that they include.
+    approximates : bool
+        Whether quotients or roots are among them, within 2 units of the last place.
+    without : str
+        The operations that have no bound; "" where there is one.
+    """
+
+    errors: Mapping[str, tuple[Fraction, ...]] = field(default_factory=dict, hash=False)
+    per_step: Fraction | None = None
+    roundings: int = 0
+    approximates: bool = False
+    without: str = ""
+
+    @property
+    def worst(self) -> dict[str, Fraction]:
+        """The largest error bound of an element by the name of the output."""
+        return {name: max(errors) for name, errors in self.errors.items()}
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the bounds as plain JSON data, exactly."""
+        return {
+            "errors": _as_text(self.errors),
+            "per_step": None if self.per_step is None else str(self.per_step),
+            "roundings": self.roundings,
+            "approximates": self.approximates,
+            "without": self.without,
+        }
+
+    @classmethod
+    def from_dict(cls, data: Mapping[str, Any]) -> AnyOrder:
+        """Rebuild bounds from `as_dict`."""
+        per_step = data["per_step"]
+        return cls(
+            _as_numbers(data["errors"]),
+            per_step and Fraction(per_step),
+            data["roundings"],
+            data["approximates"],
+            data["without"],
+        )
+
+
+def _as_text(errors: Mapping[str, tuple[Fraction, ...]]) -> dict[str, list[str]]:
+    return {name: list(map(str, each)) for name, each in errors.items()}
+
+
+def _as_floats(errors: Mapping[str, tuple[Fraction, ...]]) -> dict[str, list[float]] | None:
+    return {name: list(map(float_above, each)) for name, each in errors.items()} or None
+
+
+def _as_numbers(errors: Mapping[str, Iterable[str]]) -> dict[str, tuple[Fraction, ...]]:
+    return {name: tuple(map(Fraction, each)) for name, each in errors.items()}
+
+
+@dataclass(frozen=True)
 class RoundingBounds(ReadOnly):
     """Bounds of the distance of generated code from exact arithmetic on the same inputs.
 
@@ -277,6 +341,8 @@ class RoundingBounds(ReadOnly):
         Their accumulation over a run; None for other kernels.
     reason : str
         The reason why no bound is known; "" where there is one.
+    any_order : AnyOrder or None
+        The bounds of the code compiled with ``-ffast-math``; None where no bound is known.
 
     Examples
     --------
@@ -295,6 +361,7 @@ class RoundingBounds(ReadOnly):
     step: StepRounding | None = None
     accumulation: RoundingAccumulation | None = None
     reason: str = ""
+    any_order: AnyOrder | None = None
 
     __repr__ = short_repr
 
@@ -321,8 +388,8 @@ class RoundingBounds(ReadOnly):
             "inputs": {condition.value: float_below(condition.high) for condition in self.inputs},
             "conditions": {c.value: [float_above(c.low), float_below(c.high)] for c in self.conditions},
             "functions": list(self.functions),
-            "errors": {name: [float_above(error) for error in errors] for name, errors in self.errors.items()}
-            or None,
+            "errors": _as_floats(self.errors),
+            "errors_in_any_order": self.any_order and _as_floats(self.any_order.errors),
             "run": adds_up
             and {"per_step": float_above(adds_up.per_step), "growth": float_above(adds_up.growth - 1)},
             "reason": self.reason or None,
@@ -337,10 +404,11 @@ class RoundingBounds(ReadOnly):
             "inputs": [condition.as_dict() for condition in self.inputs],
             "conditions": [condition.as_dict() for condition in self.conditions],
             "functions": list(self.functions),
-            "errors": {name: list(map(str, errors)) for name, errors in self.errors.items()},
+            "errors": _as_text(self.errors),
             "step": self.step and self.step.as_dict(),
             "accumulation": adds_up and {name: str(value) for name, value in asdict(adds_up).items()},
             "reason": self.reason,
+            "any_order": self.any_order and self.any_order.as_dict(),
         }
 
     @classmethod
@@ -353,8 +421,9 @@ class RoundingBounds(ReadOnly):
             tuple(map(Condition.from_dict, data["inputs"])),
             tuple(map(Condition.from_dict, data["conditions"])),
             tuple(data["functions"]),
-            {name: tuple(map(Fraction, errors)) for name, errors in data["errors"].items()},
+            _as_numbers(data["errors"]),
             data["step"] and StepRounding.from_dict(data["step"]),
             adds_up and RoundingAccumulation(**{name: Fraction(value) for name, value in adds_up.items()}),
             data["reason"],
+            data["any_order"] and AnyOrder.from_dict(data["any_order"]),
         )

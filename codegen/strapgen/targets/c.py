@@ -13,7 +13,7 @@ from strapgen.ir.program import Operation, Program, Reference, names_in, walk
 from strapgen.ir.signals import Signal
 from strapgen.ir.sources import Sources
 from strapgen.targets import contract, contract_lines
-from strapgen.targets.contract import rounding_text, with_names
+from strapgen.targets.contract import allows_fast_math, fast_math_text, rounding_text, with_names
 from strapgen.targets.names import C, Language, function_name, printed
 from strapgen.targets.printer import Printer, fill_expression
 from strapgen.targets.registry import TARGETS
@@ -31,6 +31,14 @@ class Real:
     suffix: str  # that of its literals and of the functions of math.h
     infix: str  # ending of function and file names, so that the code of both types links into one program
     bytes: int
+
+    @property
+    def bits(self) -> dict[str, str]:
+        """All bits but the sign, those of infinity and those of a NaN, as literals of unsigned integers."""
+        width, fraction = (64, 52) if self.bytes == 8 else (32, 23)
+        numbers = {"magnitude": (1 << (width - 1)) - 1, "infinity": (1 << (width - 1)) - (1 << fraction)}
+        numbers["nan"] = numbers["infinity"] + (1 << (fraction - 1))
+        return {name: f"UINT{width}_C(0x{number:x})" for name, number in numbers.items()}
 
 
 DOUBLE = Real("double", "", "", 8)
@@ -147,6 +155,9 @@ def values_of(
         "contract": contract_lines.of_program(program, name, command, rounding),
         "normalizing": contract.upkeep_text(program, target=target),
         "rounding": rounding_text(rounding, program),
+        "fast_math": fast_math_text(rounding, program),
+        "rounding_known": not rounding.reason,
+        "allows_fast_math": allows_fast_math(rounding, program),
         "real": real,
         "state": program.inputs[0],
         "samples": program.inputs[-1],

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from fractions import Fraction
 from functools import partial
@@ -317,6 +317,11 @@ def with_names(bounds: RoundingBounds, program: Program, named: Program) -> Roun
         inputs=tuple(renamed(condition, inputs) for condition in bounds.inputs),
         conditions=tuple(renamed(c, outputs | inputs | values) for c in bounds.conditions),
         errors={outputs[name]: errors for name, errors in bounds.errors.items()},
+        any_order=bounds.any_order
+        and replace(
+            bounds.any_order,
+            errors={outputs[name]: errors for name, errors in bounds.any_order.errors.items()},
+        ),
     )
 
 
@@ -338,25 +343,50 @@ def rounding_text(
         return f"no bound: {bounds.reason}"
     if not any(bounds.worst.values()):
         return "none; every output is exact"
-    text = f"against exact arithmetic on the same inputs, {_errors(bounds)}"
+    text = f"against exact arithmetic on the same inputs, {_errors(bounds.worst, bounds.unit)}"
     if bounds.accumulation is not None:
-        row = "row of the error" if len(program.inputs[0].shape) == 2 else "error"
-        growth = bounds.accumulation.growth - 1
-        stretched = f" exp({above(growth)} N)" if growth else ""
-        text += (
-            f"; the {row} after N steps is at most {above(bounds.accumulation.per_step)} N{stretched} long"
-        )
+        text += _after_steps(program, bounds.accumulation.per_step, bounds.accumulation.growth)
     return f"{text}. This holds for {_conditions(bounds, flag, library)}"
 
 
-def _errors(bounds: RoundingBounds) -> str:
+def fast_math_text(bounds: RoundingBounds, program: Program) -> str:
+    """Return what holds of code that is compiled with ``-ffast-math``, as a sentence without the last full stop."""
+    order = bounds.any_order
+    if order is None or not allows_fast_math(bounds, program):
+        by_value = "numbers passed by value, which compilers take for finite"
+        return f"refused; there is no bound for {(order and order.without) or by_value}"
+    text = _errors(order.worst, bounds.unit)
+    if order.per_step is not None and bounds.accumulation is not None:
+        text += _after_steps(program, order.per_step, bounds.accumulation.growth)
+    approximated = ", quotients and roots within 2 ulp" if order.approximates else ""
+    return (
+        f"{text}. This holds on the same ranges for any order of the operations, fused or not, with at most "
+        f"{order.roundings} roundings from an input to an output{approximated}; subnormal numbers may be flushed to "
+        "zero. An input that is not finite makes all outputs NaN"
+    )
+
+
+def allows_fast_math(bounds: RoundingBounds, program: Program) -> bool:
+    """Return whether the code may be compiled with ``-ffast-math``."""
+    order = bounds.any_order
+    return order is not None and not order.without and all(signal.shape for signal in program.inputs)
+
+
+def _after_steps(program: Program, per_step: Fraction, growth: Fraction) -> str:
+    """Return the error of a run of N steps."""
+    row = "row of the error" if len(program.inputs[0].shape) == 2 else "error"
+    stretched = f" exp({above(growth - 1)} N)" if growth > 1 else ""
+    return f"; the {row} after N steps is at most {above(per_step)} N{stretched} long"
+
+
+def _errors(largest: Mapping[str, Fraction], unit: Fraction) -> str:
     """Return the largest error of every output."""
     parts = [
         f"error of {name} <= {above(worst)}" if worst else f"{name} is exact"
-        for name, worst in bounds.worst.items()
+        for name, worst in largest.items()
     ]
     if len(parts) == 1:
-        parts[0] += f" ({above(bounds.worst.popitem()[1] / bounds.unit)} ulp of 1)"
+        parts[0] += f" ({above(max(largest.values()) / unit)} ulp of 1)"
     return ", ".join(parts)
 
 

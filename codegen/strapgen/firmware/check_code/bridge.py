@@ -17,7 +17,6 @@ from strapgen.firmware.check_code.foreign_arguments import (
     CPP_SUFFIXES,
     FOREIGN_SUFFIXES,
     INTERVALS,
-    MEMORY,
     PRECISIONS,
     STATE,
     STEP,
@@ -57,7 +56,11 @@ __attribute__((visibility("default"))) int strapgen_foreign_run(
     int flags = 0;
     long last = 0, period = 0, count = 0;
     for (long call = 0; call < calls; ++call) {{
-        if (*input++ != 0.0) {{
+        const double begins = *input++;
+        if (begins != 0.0) {{
+            if (begins == 1.0) {{
+{cleared}
+            }}
 {reset}
 #line 1 "--init"
             {begins}
@@ -111,10 +114,11 @@ class ForeignSource:
     function: str
     signature: Signature
     arguments: ForeignArguments
-    #: What begins a run, as the user has it, its statement, and the arguments of a constructor; "" if there is none
+    #: What begins a run, as the user has it, and its statement; "" if there is none
     init: str = ""
     begins: str = ""
-    constructor: str = ""
+    #: Memory, and the arguments of its constructor
+    constructor: tuple[str, str] = ("", "")
     #: "double", "float", or an integer such as "int32"
     precision: str = "double"
     #: Calls to a result; 0 if the function says by what it returns when it has one
@@ -190,7 +194,19 @@ def read_source(
     source = ForeignSource(
         reader.file, function, signature, arguments, precision=found, sources=tuple(map(Path, sources))
     )
-    return _with_publications(_with_init(source, init, reader), publishes, reader)
+    source = _with_init(source, init, reader)
+    for memory in arguments.memories if source.read.is_cpp else ():
+        if memory.name != source.constructor[0] and not reader.expressions([f"{memory.type}()"]):
+            name = _last(memory.type)
+            raise InputError(
+                f'{memory.type} has no constructor without arguments; --init "{name}(...)" states them, as {name}(0.01)'
+            )
+    return _with_publications(source, publishes, reader)
+
+
+def _last(name: str) -> str:
+    """Return a name without the scopes before it."""
+    return name.rpartition("::")[2].removeprefix("struct ").removeprefix("class ")
 
 
 def is_cpp(path: Path) -> bool:
@@ -256,9 +272,9 @@ def _with_init(source: ForeignSource, init: str, reader: SourceReader) -> Foreig
     said = inside.rpartition(")")[0]
     for each in memories:
         said = re.sub(rf"(?<!\.)\b{each.name}\b", reading.variable(each), said)
-    owner = source.signature.owner
-    if owner and name.rpartition("::")[2] == owner.rpartition("::")[2]:
-        return replace(source, constructor=said, init=init)
+    made = next((each for each in memories if _last(each.type) == _last(name)), None)
+    if made and source.read.is_cpp:
+        return replace(source, constructor=(made.name, said), init=init)
     signature = reader.signature("--init", name)
     called = signature.name
     if signature.owner:
@@ -333,6 +349,7 @@ def bridge_text(source: ForeignSource) -> str:
     return _BRIDGE.format(
         file=source.read.path.resolve().as_posix(),
         declarations="\n".join(declared),
+        cleared=_lines(_cleared(source), 16),
         reset=_lines(_reset(source), 12),
         begins=source.begins,
         before=_lines(_before(source, values), 12),
@@ -391,18 +408,23 @@ def _call(source: ForeignSource, keeps: bool) -> str:
     return call
 
 
-def _reset(source: ForeignSource) -> list[str]:
-    """Return the statements that begin a run."""
+def _cleared(source: ForeignSource) -> list[str]:
+    """Return the statements that make memory as it is before a run."""
     lines = []
     for memory in source.arguments.memories:
         name = reading.variable(memory)
-        made = source.constructor if memory.name == MEMORY else ""
+        made = dict([source.constructor]).get(memory.name, "")
         if source.read.is_cpp:
             lines += [f"if ({name}_lives)", f"    {name}.~{name}_t();"]
             lines += [f"new ({name}_bytes) {name}_t({made});", f"{name}_lives = true;"]
         else:
             lines.append(f"memset(&{name}, 0, sizeof {name});")
-    number = 0
+    return lines
+
+
+def _reset(source: ForeignSource) -> list[str]:
+    """Return the statements that set the state at the begin of a run."""
+    lines, number = [], 0
     for result in source.arguments.results:
         held = source.arguments.before(result)
         lines += [

@@ -183,7 +183,9 @@ class ForeignOptions:
 
         if is_callable(file):
             return interpreted_source(
-                file, self.function, self.arguments, self.init or "", self.precision or "double"
+                *(file, self.function, self.arguments, self.init or "", self.precision or "double"),
+                takes=self.input or "",
+                is_angle_said=self.angle_unit is not None,
             )
         if self.function is None:
             raise InputError(f"{file} needs --function; --function NAME says which one is checked")

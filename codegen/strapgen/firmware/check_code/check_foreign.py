@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from strapgen.firmware.check_code import coning_causes, ladder
+from strapgen.firmware.check_code.bridge import ForeignSource
 from strapgen.firmware.check_code.conformance import Finding, finding_text
 from strapgen.firmware.check_code.coning_causes import MeasuredCoefficient
 from strapgen.firmware.check_code.foreign import (
@@ -178,6 +179,8 @@ class _Check:
         self.remedy: Remedy | None = None
         #: That of the function, once it is known
         self.convention: Convention | None = None
+        size = min(_RANDOM, step.most / 2)  # of a component, half as large as a vector may be
+        self.random: Array = np.random.default_rng(1969).uniform(-size, size, (20, self.count, 3))
         self.velocity = VelocityFindings(Velocity(step)) if step.source.arguments.translations else None
 
     def outcome(self) -> ForeignResult:
@@ -245,7 +248,9 @@ class _Check:
         if self.velocity is not None:
             yield from self.velocity.findings(runs)
             self.causes.extend(self.velocity.causes)
+            self.sure = self.sure or self.velocity.sure
         yield self.repeated(*runs["runs"])
+        yield from self.used(convention)
 
     def upsets(self, found: Sequence[Finding]) -> Iterator[Finding]:
         """Yield the findings on input that fails and on long runs, once the function is known to work otherwise."""
@@ -266,7 +271,13 @@ class _Check:
     def calls(self, done: ForeignRun) -> Finding:
         """Return the finding on crashes of calls, and on writes outside of their memory."""
         if done.stopped:
-            return self.failed("calls", done.stopped)
+            raises = done.stopped.startswith("it raises") and not isinstance(self.step.source, ForeignSource)
+            also = (
+                "; if it takes arrays of other shapes, --arguments says so, as increments[2][3]"
+                if raises
+                else ""
+            )
+            return self.failed("calls", f"{done.stopped}{also}")
         if done.writes_beyond:
             return self.failed("calls", "it writes beyond the ends of its arrays")
         if done.changes_inputs:
@@ -310,14 +321,10 @@ class _Check:
 
     def segments(self) -> list[tuple[str, list[Segment]]]:
         """Return all segments of the measurements under their names."""
-        generator = np.random.default_rng(1969)
-        size = min(_RANDOM, self.step.most / 2)  # of a component, half as large as a vector may be
-        increments = generator.uniform(-size, size, (20, self.count, 3))
-        pushes = generator.uniform(-size, size, increments.shape)
         return [
-            ("runs", [Segment(increments, settled=False, velocities=pushes)] * 2),
+            ("runs", [Segment(self.random, settled=False, velocities=self.random)] * 2),
             *([] if self.velocity is None else self.velocity.segments()),
-            *(self.of_attitude(increments) if self.step.source.arguments.elements else ()),
+            *(self.of_attitude(self.random) if self.step.source.arguments.elements else ()),
         ]
 
     def of_attitude(self, increments: Array) -> list[tuple[str, list[Segment]]]:
@@ -469,8 +476,15 @@ class _Check:
             self.sure = coning_causes.confidence(known, said)
         if not holds:
             self.remedy = remedy(coning_causes.nearest(known)[1])
-        text = f"{coning_causes.in_words(self.coefficients)}; {self.ratio:.3f} of what coning needs"
-        return Finding("coefficients", holds, text, self.ratio, coning_causes.tolerance(known))
+        return Finding(
+            *(
+                "coefficients",
+                holds,
+                coning_causes.in_words(known),
+                self.ratio,
+                coning_causes.tolerance(known),
+            )
+        )
 
     def symmetry(self, plain: SegmentRun, turned: SegmentRun) -> Finding:
         """Rotate all increments: the attitude must rotate with them."""
@@ -506,6 +520,21 @@ class _Check:
         init = self.step.source.init
         after = f"after {init}" if init else "no --init is named, and"
         return Finding("runs", False, f"{after} a second run differs from the first by {off:.3g}", off, 0.0)
+
+    def used(self, convention: Convention) -> Iterator[Finding]:
+        """Yield what --init leaves of an earlier run in used memory; it is no fault, as a caller may zero it."""
+        source = self.step.source
+        if not isinstance(source, ForeignSource) or not (source.begins and source.arguments.memories):
+            return
+        segment = Segment(self.random, settled=False, velocities=self.random)
+        done, parts = self.step.outputs([segment, replace(segment, used=True)], convention)
+        if done.stopped:
+            yield Finding(
+                "used memory", None, f"after {source.init} in the memory of an earlier run {done.stopped}"
+            )
+        elif (off := float(np.abs(parts[0] - parts[1]).max())) > 0:
+            text = f"{source.init} leaves something of an earlier run, by which the next one differs by {off:.3g}"
+            yield Finding("used memory", None, f"{text}, unless its caller zeroes the memory", off)
 
 
 def _numbers(run: SegmentRun) -> list[Array]:

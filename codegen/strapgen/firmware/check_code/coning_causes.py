@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from fractions import Fraction
 
 from strapgen.catalogue.methods.coning_coefficients import FORMS, Design, design
+from strapgen.firmware.check_code.probes import LATE as _LATER_CALLS
 from strapgen.firmware.check_code.probes import MOST_PREVIOUS, Products, Table
 
 ABSENT = "correction absent or zero"
@@ -17,6 +18,7 @@ FACTOR_TWO = "correction off by a factor of 2"
 SUM_LATE = "the sum of the samples before lacks the last one (one sample late)"
 REVERSED = "the samples of a call are taken in reverse order"
 EARLIER_REVERSED = "the samples from before a call are taken in reverse order, the newest first"
+STAYS = "the correction of a call is not reset: later calls apply it again"
 STATE_KEPT = "state kept between runs"
 #: What stands beside causes where the coefficients have none.
 RIGHT = "no fault of the coefficients"
@@ -58,15 +60,17 @@ def measured(products: Products) -> tuple[MeasuredCoefficient, ...]:
     )
 
 
-def in_words(coefficients: Sequence[MeasuredCoefficient], newer: str = "d") -> str:
-    """Return coefficients in words; `newer` is the letter of the second factor."""
+def in_words(products: Products, what: str = "coning") -> str:
+    """Return the coefficients of a correction in words, and how much of it they are."""
+    coefficients, newer = measured(products), "d" if what == "coning" else "v"
     by_difference = sorted(coefficients, key=lambda each: -abs(each.seen - each.wanted))
     parts = [
         f"d{each.older} x {newer}{each.newer} {each.seen:.4g} ({each.wanted:.4g})"
         for each in by_difference[:_MOST_SHOWN]
     ]
     rest = f" and {len(by_difference) - _MOST_SHOWN} more" if len(by_difference) > _MOST_SHOWN else ""
-    return f"seen (wanted): {', '.join(parts)}{rest}"
+    later = "with what later calls add " if _any(_less(products.finally_, products.at_once)) else ""
+    return f"seen (wanted): {', '.join(parts)}{rest}; {later}{ratio(products):.3f} of what {what} needs"
 
 
 def standard_design(products: Products) -> Design:
@@ -147,6 +151,14 @@ def comes_late(products: Products) -> bool:
     return False
 
 
+def stays(products: Products) -> bool:
+    """Return whether every later call adds the correction of a call again."""
+    later = _less(products.finally_, products.at_once)
+    corrections = [_less(products.at_once, base) for base in _bases(products.at_once, products.samples)]
+    again = [{pair: _LATER_CALLS * c for pair, c in each.items()} for each in corrections]
+    return any(_alike(later, each, products.noise) for each in again)
+
+
 def weights_off(products: Products) -> bool:
     """Return whether the attitude turns by more or less of a sample than it is."""
     return any(abs(weight - 1) > _WEIGHT_WITHIN for weight in products.weights)
@@ -170,10 +182,29 @@ def cause(products: Products) -> str | None:
         return uneven
     if comes_late(products):
         return LATE
+    if stays(products):
+        return STAYS
     for said, base, table in _faults(products):
         if _fits(products, base, table):
             return said
     return None if corrects_coning(products) else _by_size(products)
+
+
+def one_sided(sides: tuple[Table, Table], noise: float, samples: int) -> str | None:
+    """Return the cause where the products of one side alone are wrong: d_i x v_j, or v_i x d_j, i the older sample."""
+    for ideal, base in _ideals(samples):
+        corrections = [_less(side, base) for side in sides]
+        right = [_alike(each, ideal, noise) for each in corrections]
+        if right.count(True) == 1:
+            wrong, names = corrections[right.index(False)], ["d_i x v_j", "v_i x d_j"]
+            visible = {pair: ideal.get(pair, 0.0) for pair in wrong}
+            size = f"{_moment(wrong) / _moment(visible):.3g} times as large as needed"
+            said = (
+                "absent" if not _any(wrong) else size if _alignment(wrong, visible) > _MULTIPLE else "wrong"
+            )
+            names = names if right[1] else names[::-1]
+            return f"of an older sample i and a newer j {names[0]} is {said}, {names[1]} right"
+    return None
 
 
 def _faults(products: Products) -> Iterator[tuple[str, Table, Table]]:
@@ -218,7 +249,7 @@ def confidence(products: Products, said: str) -> tuple[float, str] | None:
     >>> round(value, 3), other
     (0.926, 'correction absent or zero')
     """
-    if weights_off(products) or _uneven(products) is not None or comes_late(products):
+    if weights_off(products) or _uneven(products) is not None or comes_late(products) or stays(products):
         return None
     left: dict[str, float] = {}
     ideals = [(RIGHT, base, ideal) for ideal, base in _ideals(products.samples)]

@@ -29,8 +29,10 @@ from strapgen.firmware.check_code.foreign_arguments import (
     FORCES,
     FRAME_RATE,
     GRAVITY,
+    INTERVALS,
     PUSHES,
     RATES,
+    STEP,
     VELOCITY,
     is_whole,
 )
@@ -72,12 +74,15 @@ _NOTHING = (0.0, 0.0, 0.0)
 PATIENCE = 20
 #: Largest rate in rad/s that is fed while the interval is short: a gyro measures it (2000 deg/s are 34.9 rad/s).
 _MOST_RATE = 30
+_PRECISION_IN_WORDS = {"float": "single precision", "double": "double precision"}
 #: Elements of an attitude that are larger are none; their products stay finite.
 _LARGEST = 1e30
 #: Smallest ratio of the least to the largest stretch of a state that has a direction.
 _FLAT = 1e-3
 #: Without contraction to fused multiply-add every machine computes the same bits.
 _FLAGS = ("-O1", "-ffp-contract=off", "-g0", "-fPIC", "-fvisibility=hidden")
+#: Largest part of an interval by which one in whole numbers may be another.
+_WHOLE_WITHIN = 1e-3
 #: Calls in which a function that has a result after several calls has two at least.
 _MOST_CALLS = 130
 _MODULE = "strapgen_foreign"
@@ -140,6 +145,8 @@ class Segment:
     velocities: Array | None = None
     #: (N,): sampling interval in s that each call is told; None for that of the function
     intervals: Array | None = None
+    #: Whether the run begins in memory that has what is left of the one before
+    used: bool = False
 
 
 @dataclass(frozen=True)
@@ -229,6 +236,7 @@ class ForeignStep:
             raise InputError("--frame-rate-rad-s goes with an attitude behind the arrow of --arguments")
         if isinstance(source, ForeignSource):
             self._require_scales(source)
+            self._require_whole_intervals(source)
             source = self._with_period(source)
             object.__setattr__(self, "source", source)
             calls: Callable[[Any, Any], ForeignRun] = partial(run_foreign, compile_foreign(source))
@@ -262,11 +270,27 @@ class ForeignStep:
                 "point, as 30 where 2**30 stands for 1"
             )
 
+    def _require_whole_intervals(self, source: ForeignSource) -> None:
+        """Refuse an integer that does not hold the sampling interval in its unit."""
+        for argument in source.arguments.parameters:
+            if argument.name not in (*INTERVALS, STEP) or argument.type or not is_whole(argument):
+                continue
+            count = source.arguments.count if argument.name == STEP else 1
+            units = float(self.interval) * count / INTERVALS.get(argument.name, 1.0)
+            if abs(round(units) - units) > _WHOLE_WITHIN * units:
+                unit = argument.name.partition("_")[2] or "s"
+                ways = (
+                    "--arguments with dt_ms or dt_us says what it counts"
+                    if unit == "s"
+                    else "--sample-hz states another interval"
+                )
+                raise InputError(
+                    f"`{argument.carriers[0].text}` is a whole number, and the interval is {units:.6g} {unit}; {ways}"
+                )
+
     @property
     def reading(self) -> str:
-        """How the function is called, in one line; "" where nothing was read."""
-        if not isinstance(self.source, ForeignSource):
-            return self.source.reading
+        """How the function is called, in one line."""
         unit = {1.0: "rad", math.radians(1): "deg"}.get(self.angle_unit, f"{self.angle_unit:.6g} rad")
         every = f", a result every {self.source.publishes} calls" if self.source.publishes > 1 else ""
         return f"reads: {in_words(self.source.function, self.source.arguments, self.takes, unit)}{every}"
@@ -282,6 +306,12 @@ class ForeignStep:
         if self.source.is_integer:
             return max(self.angle_unit, 2.0**-self.state_bits if self.state_bits else 0.0)
         return float(np.finfo(np.float32 if self.source.precision == "float" else np.float64).eps)
+
+    @property
+    def rounding(self) -> str:
+        """What rounds, in words."""
+        whole = self.source.is_integer
+        return f"rounding to {self.source.precision}" if whole else _PRECISION_IN_WORDS[self.source.precision]
 
     @property
     def most(self) -> float:
@@ -374,7 +404,7 @@ class ForeignStep:
             [numbers, *(np.broadcast_to(each, (len(numbers), each.shape[-1])) for each in beside)]
         )
         rows = np.empty((len(numbers), 3 + numbers[0].size))
-        rows[:, 0] = np.arange(len(numbers)) == 0
+        rows[0, 0], rows[1:, 0] = 2 if segment.used else 1, 0
         rows[:, 1] = float(self.interval)
         rows[:, 2] = float(self.interval * self.source.arguments.count)
         rows[:, 3:] = numbers
@@ -455,9 +485,9 @@ def run_calls(
     `input`, and further `files`; the command writes `output`, and `flags` last. What it refuses it says in `refused`,
     and why the function ended early in `stopped`.
 
-    `identity` (elements,): the state that a run begins with. `rows` (N, 3 + numbers): for each call whether a
-    run begins, the sampling interval in s, the duration of the call in s, and the numbers of its arguments, the
-    previous samples before those of the call.
+    `identity` (elements,): the state that a run begins with. `rows` (N, 3 + numbers): for each call whether a run
+    begins, 1, or 2 in memory as it is, the sampling interval in s, the duration of the call in s, and the numbers of
+    its arguments, the previous samples before those of the call.
     """
     values = np.ascontiguousarray(rows, np.float64)
     start = np.ascontiguousarray(identity, np.float64)

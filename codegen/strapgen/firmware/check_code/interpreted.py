@@ -6,27 +6,27 @@ import json
 import re
 import subprocess
 import sys
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar
 
-from strapgen.firmware.check_code import foreign
-from strapgen.firmware.check_code.foreign_arguments import PRECISIONS, ForeignArguments, read_arguments
+from strapgen.firmware.check_code import foreign, reading
+from strapgen.firmware.check_code.foreign_arguments import (
+    CONSTANT,
+    MEMORY,
+    PRECISIONS,
+    ZEROS,
+    ForeignArgument,
+    ForeignArguments,
+    read_arguments,
+)
+from strapgen.firmware.check_code.signature import Signature, SourceFile, Value
 from strapgen.ir import checks
 from strapgen.ir.exceptions import CompilerError, InputError
 from strapgen.run import octave
 from strapgen.storage import drafts
 
-#: What parameters are whose names say it. Any other name needs --arguments.
-_KNOWN = {
-    "state[4]": ("state", "q", "quat", "quaternion", "attitude"),
-    "state[3][3]": ("dcm", "C", "rotation_matrix"),
-    "increments[3]": ("increments", "increment", "delta_angle", "delta_theta", "dtheta"),
-    "rates[3]": ("rates", "rate", "gyro", "omega", "angular_rate"),
-    "dt": ("dt",),
-    "step": ("step",),
-}
-_UNITS = {"increments": " in rad", "rates": " in rad/s", "dt": " in s", "step": " in s"}
 #: Python and Octave take so many times longer for a call than compiled code.
 _SLOWER = 3
 _MATLAB = ".m"
@@ -54,8 +54,6 @@ class InterpretedSource:
     init: str = ""
     #: "double" or "float", the type of the arrays that it gets
     precision: str = "double"
-    #: Names of the parameters where they say what they are
-    names: tuple[str, ...] = ()
     #: Calls to a result, which is one here
     publishes: ClassVar[int] = 1
     is_integer: ClassVar[bool] = False
@@ -66,47 +64,56 @@ class InterpretedSource:
             self._command(), identity, rows, patience=_SLOWER * foreign.PATIENCE, plan=self._plan()
         )
 
-    @property
-    def reading(self) -> str:
-        """What its parameters are taken for, where their names say it; else nothing."""
-        if not self.names:
-            return ""
-        known = zip(self.names, self._parameters, strict=True)
-        words = [f"{name}: {what}{shape or ''}{_UNITS.get(what, '')}" for name, (what, shape) in known]
-        return f"reads: {self.function}({', '.join(words)}) -> {self.arguments.elements} elements"
-
-    @property
-    def _parameters(self) -> list[tuple[str, list[int]]]:
-        """Names and shapes of what it is called with; results that it returns are none of them."""
-        arguments = self.arguments
-        returned = [each for each in arguments.results if arguments.before(each) != each]
-        return [
-            (each.name, list(each.shape))
-            for each in arguments.parameters
-            if not each.type and each not in returned
-        ]
-
     def _command(self) -> list[str]:
         if self.file.suffix == _MATLAB:
             return [*octave.command(), "--norc", "--no-history", "--quiet", str(_runner("octave_runner.m"))]
         return _PYTHON
 
     def _plan(self) -> str:
-        arguments = self.arguments
+        arguments, constants = self.arguments, {}
+        parameters: list[tuple[str, list[int], int]] = []
+        names: list[str] = []
+        for each in arguments.parameters:
+            carriers = [value for value in each.carriers if value.passed != "return"]
+            name = f"constant_{len(parameters)}" if each.name == CONSTANT else each.name
+            if each.name == CONSTANT:
+                constants[name] = _constant(each.text)
+            if not each.type:
+                names += [value.name for value in carriers]
+                one_by_one = len(carriers) > 1 and len(carriers) == each.size
+                parameters += [
+                    (name, [] if one_by_one else list(each.shape), k if one_by_one else -1)
+                    for k in range(len(carriers))
+                ]
         held = [arguments.before(result) for result in arguments.results]
         plan = _place(self.file) | {
             "function": self.function,
             "init": self.init,
             "type": self.precision,
-            "parameters": self._parameters,
-            "names": self.names,
+            "parameters": parameters,
+            "constants": constants,
+            "zeros": [each.size for each in arguments.parameters if each.name == ZEROS],
+            "names": names,
             "fed": [(each.name, each.size) for each in arguments.fed],
             "results": [
-                (each.name, each.size, before.name if before else "")
+                (each.name, each.size, before.name if before else "", _places(each))
                 for each, before in zip(arguments.results, held, strict=True)
             ],
         }
         return json.dumps(plan)
+
+
+def _constant(text: str) -> Any:
+    try:
+        return json.loads(text)
+    except ValueError:
+        raise InputError(f"--arguments: the constant {text!r} is no number, true or false") from None
+
+
+def _places(result: ForeignArgument) -> list[str]:
+    """Return where the numbers of a result are read after a call; nothing if they are returned or changed in place."""
+    at = f"{reading.variable(ForeignArgument(MEMORY))}."
+    return [value.name.replace(at, f"{MEMORY}.") for value in result.carriers if not value.type]
 
 
 def _runner(name: str) -> Path:
@@ -125,7 +132,14 @@ def _place(file: Path) -> dict[str, Any]:
 
 
 def interpreted_source(
-    text: str, function: str | None, arguments: str | None, init: str, precision: str
+    text: str,
+    function: str | None,
+    arguments: str | None,
+    init: str,
+    precision: str,
+    *,
+    takes: str = "",
+    is_angle_said: bool = False,
 ) -> InterpretedSource:
     """Return the function that a text names; its parameters say what they are unless arguments are stated."""
     checks.choice("precision", precision, PRECISIONS)
@@ -136,43 +150,60 @@ def interpreted_source(
     if matched and function is not None:
         raise InputError(f"--function {function} goes with a file; {text} names a function already")
     name = matched["name"] if matched else function or file.stem
-    parameters = _signature_of_matlab(file, name) if not matched else _signature_of_python(file, name)
-    names: tuple[str, ...] = ()
-    if arguments is None:
-        names, arguments = _read(name, parameters)
-    if re.search(r"->\s*self\.", arguments):
-        arguments = f"object *self, {arguments}"
-    known = read_arguments(arguments)
-    for each in (*known.parameters, *known.results):
-        if not each.shape and not each.type and each.name not in ("dt", "step"):
-            raise InputError(
-                f"--arguments: {each.name} needs its numbers, as state[4], for code that declares none"
-            )
-    return InterpretedSource(file, name, known, init, precision, names)
+    reader = _Names(file, _described(file, name, init) if matched else {"parameters": _of_matlab(file, name)})
+    proposed = "" if arguments else reading.proposed(reader.signature(name), reader, takes, is_angle_said)
+    said = arguments or proposed.replace("[9]", "[3][3]")  # whose elements C cannot tell
+    known = reading.joined(reader.signature(name, said), said, reader)
+    return InterpretedSource(file, name, known, init, precision)
 
 
-def _read(function: str, parameters: list[str]) -> tuple[tuple[str, ...], str]:
-    """Return the names of parameters that say what they are, and the same as --arguments."""
-    meant = {name: what for what, names in _KNOWN.items() for name in names}
-    needed = [name for name in parameters if not name.endswith("=")]
-    for name in needed:
-        if name not in meant:
-            known = ", ".join(name for names in _KNOWN.values() for name in names)
-            raise InputError(
-                f"{function}({', '.join(needed)}): {name} does not say what it is; --arguments says it, as "
-                f'"state[4], increments[3] -> state[4]"; known names: {known}'
-            )
-    state = next((meant[name] for name in needed if meant[name].startswith("state")), "state[4]")
-    return tuple(needed), f"{', '.join(meant[name] for name in needed)} -> {state.replace('state', 'next')}"
+class _Names:
+    """The names that a module has: of parameters, of fields of an object, and of variables; see `reading.Reader`."""
+
+    def __init__(self, file: Path, described: dict[str, Any]) -> None:
+        self.file = SourceFile(file, is_cpp=False)
+        self.described = described
+
+    def signature(self, name: str, stated: str = "") -> Signature:
+        """Return the signature of the function, of what is stated where it has none that can be read."""
+        returns, names = self.described.get("returns", True), self.described["parameters"]
+        if names is None:
+            if not stated:
+                raise InputError(f"{name} has no signature that can be read; --arguments is needed")
+            known = read_arguments(stated, (MEMORY,))
+            names = [
+                each.name for each in known.parameters if each.name != MEMORY and each not in known.results
+            ]
+        values = [self._value(each, "object", written=not returns) for each in names]
+        owner = name.rpartition(".")[0] if self.described.get("owner") else ""
+        return Signature(name, tuple(values), owner, self._value("result", "object") if returns else None)
+
+    def _value(self, text: str, kind: str, count: int = 0, *, written: bool = False) -> Value:
+        """Return a value with a name, of so many numbers, or of any number of them."""
+        elements = tuple(f"[{k}]" for k in range(count)) if count > 1 else ("",)
+        return Value(text.rstrip("="), text, kind, (), "", written, elements, "double", open=not count)
+
+    def results(self, places: Iterable[str], before: Sequence[str] = ()) -> dict[str, Value]:
+        """Return what is read after a call; of what a call makes first, the number of its numbers is open."""
+        at = reading.variable(ForeignArgument(MEMORY))
+        known = self.described.get("variables", {}) | {
+            f"{at}.{name}": count for name, count in self.described.get("fields", {}).items()
+        }
+        return {place: self._value(place, "", known.get(place, 0)) for place in places}
+
+    def fields(self, name: str, before: Sequence[str]) -> list[tuple[str, bool]]:
+        """Return the fields of the object, each with whether its name is public."""
+        return [(f"{name}.{each}", not each.startswith("_")) for each in self.described.get("fields", {})]
+
+    def variables(self) -> list[str]:
+        """Return the names of the variables of the module."""
+        return [*self.described.get("variables", {})]
 
 
-def _signature_of_python(file: Path, function: str) -> list[str]:
-    """Return the names of the parameters of a callable; one with a default value has "=" behind it.
-
-    It is imported in a process of its own.
-    """
+def _described(file: Path, function: str, init: str) -> dict[str, Any]:
+    """Return what python_runner.py writes of a callable, which it imports in a process of its own."""
     with drafts.temporary_folder() as folder:
-        plan = json.dumps(_place(file) | {"function": function})
+        plan = json.dumps(_place(file) | {"function": function, "init": init})
         (folder / "plan").write_text(plan, encoding="utf-8", newline="\n")
         try:
             done = subprocess.run(
@@ -184,16 +215,16 @@ def _signature_of_python(file: Path, function: str) -> list[str]:
             )
         except subprocess.TimeoutExpired:
             raise InputError(f"{file}: its import has not come to an end in {foreign.PATIENCE} s") from None
-        refused, signature = folder / "refused", folder / "signature"
+        refused, described = folder / "refused", folder / "described"
         if refused.is_file():
             raise InputError(" ".join(refused.read_text(encoding="utf-8").split()))
-        if not signature.is_file():
+        if not described.is_file():
             raise CompilerError(f"{file}: its import ends the program, with exit status {done.returncode}")
-        read: list[str] = json.loads(signature.read_text(encoding="utf-8"))
+        read: dict[str, Any] = json.loads(described.read_text(encoding="utf-8"))
     return read
 
 
-def _signature_of_matlab(file: Path, function: str) -> list[str]:
+def _of_matlab(file: Path, function: str) -> list[str]:
     """Return the names of the parameters of a function in a file of MATLAB."""
     octave.command()  # it says what is missing
     text = re.sub(r"%[^\n]*|\.\.\.[^\n]*\n", "", file.read_text(encoding="utf-8", errors="replace"))

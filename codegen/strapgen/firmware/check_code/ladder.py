@@ -168,7 +168,7 @@ def order_in_float(
     words = f"observed {proved}" if is_too_low else f"{min(proved, needed)} or more by its coefficients"
     text = (
         f"{words}, needed {needed}; at the longest step {error:.2g} rad, published {published:.2g}, "
-        f"single precision hides {hidden:.2g}"
+        f"{step.rounding} hides {hidden:.2g}"
     )
     order = float(min(proved, needed))
     return Finding("order", not is_too_low and error <= allowed, text, order, float(min(needed, 3))), order
@@ -209,11 +209,12 @@ def drift_on_cones(
         f"{beside}{best} {published[best]:.4g}"
     )
     holds = size <= least + rounding
+    text += f"; limit {least + rounding:.4g}"
     if rounding > least / 100:
-        text += f"; single precision hides {rounding:.3g}"
+        text += f", of which {step.rounding} hides {rounding:.3g}"
         if measured is not None:
             left = abs(closed_form_deg_h(measured))
-            text += f", its coefficients leave {left:.4g}"
+            text += f"; its coefficients leave {left:.4g}, limit {least:.4g}"
             holds = holds and left <= least
     return Finding("drift", holds, text, size, least + rounding), by_axis, closed
 

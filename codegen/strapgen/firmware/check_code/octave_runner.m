@@ -43,7 +43,12 @@ function run(folder, calls)
                 feval(plan.init);
             end
         end
-        known = struct('dt', row(2), 'step', row(3));
+        known = plan.constants;
+        known.dt = row(2);
+        known.dt_ms = 1e3 * row(2);
+        known.dt_us = 1e6 * row(2);
+        known.step = row(3);
+        known.zeros = zeros(3, 1);
         place = 4;
         for n = 1:numel(plan.fed)
             size = plan.fed{n}{2};
@@ -63,7 +68,10 @@ function run(folder, calls)
             name = plan.parameters{n}{1};
             shape = plan.parameters{n}{2};
             given{n} = known.(name);
-            if numel(shape) > 0
+            element = plan.parameters{n}{3};
+            if element >= 0
+                given{n} = cast(given{n}(element + 1), kind);
+            elseif numel(shape) > 0
                 given{n} = cast(arranged(known.(name), shape), kind);
             end
             if numel(shape) == 2 && strcmp(name, 'state')

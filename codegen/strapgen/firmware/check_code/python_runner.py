@@ -1,19 +1,21 @@
 """Calls a user's function in Python, in a process of its own that may crash.
 
 Run as ``python -P python_runner.py FOLDER CALLS``, as `strapgen.firmware.check_code.foreign.run_calls` does, or without
-CALLS to write the names of its parameters to ``signature``. The folder has a ``plan`` of the call in JSON.
+CALLS to write to ``described`` what it takes, and which variables there are. The folder has a ``plan`` of the call in
+JSON.
 """
 
 from __future__ import annotations
 
+import ast
 import importlib
 import importlib.util
 import inspect
 import json
 import os
 import sys
+import textwrap
 import traceback
-from collections.abc import Callable
 from functools import reduce
 from pathlib import Path
 from typing import Any
@@ -38,7 +40,7 @@ def main(folder_name: str, calls: str = "") -> None:
         if calls:
             _call(folder, plan, module, owner, function, int(calls))
         else:
-            _write(folder / "signature", json.dumps(_parameters(owner, function)))
+            _write(folder / "described", json.dumps(_described(plan, module, owner, function)))
     except _RefusedError as refused:
         _write(folder / "refused", str(refused))
 
@@ -87,23 +89,60 @@ def _found(module: Any, plan: dict[str, Any]) -> tuple[Any, Any]:
     return (owner if inspect.isclass(owner) else None), holder
 
 
-def _parameters(owner: Any, function: Any) -> list[str]:
+def _described(plan: dict[str, Any], module: Any, owner: Any, function: Any) -> dict[str, Any]:
+    """Return the parameters of a function, whether it returns anything, and the variables of its object and module."""
     try:
         parameters = [*inspect.signature(function).parameters.values()]
     except (TypeError, ValueError):  # built in
-        return []
-    shown = parameters[1:] if owner is not None and not inspect.ismethod(function) else parameters
-    optional = {
+        return {"parameters": None, "owner": owner is not None}
+    if owner is not None and not isinstance(
+        inspect.getattr_static(owner, function.__name__), staticmethod | classmethod
+    ):
+        parameters = parameters[1:]
+    optional = [
         each.name
-        for each in shown
+        for each in parameters
         if each.default is not each.empty or each.kind in (each.VAR_POSITIONAL, each.VAR_KEYWORD)
+    ]
+    return {
+        "parameters": [f"{each.name}{'=' * (each.name in optional)}" for each in parameters],
+        "returns": _returns(function),
+        "owner": owner is not None,
+        "fields": {} if owner is None else _sizes(_begin(plan, module, owner, np.empty(0))[1]),
+        "variables": _sizes(module),
     }
-    return [f"{each.name}{'=' if each.name in optional else ''}" for each in shown]
+
+
+def _returns(function: Any) -> bool:
+    """Return whether a function has a statement that returns a value."""
+    try:
+        text = textwrap.dedent(inspect.getsource(function))
+        return any(
+            isinstance(each, ast.Return) and each.value is not None for each in ast.walk(ast.parse(text))
+        )
+    except (OSError, TypeError, SyntaxError):
+        return True
+
+
+def _sizes(holder: Any, levels: int = 2) -> dict[str, int]:
+    """Return how many numbers the variables of an object or a module have, those of inner objects included."""
+    sizes = {}
+    for name in dict.fromkeys([*getattr(holder, "__dict__", ()), *dir(holder)]):
+        value = None if name.startswith("__") else getattr(holder, name, None)
+        if value is None or callable(value) or inspect.ismodule(value):
+            continue
+        try:
+            sizes[name] = np.asarray(value.as_quat() if hasattr(value, "as_quat") else value, np.float64).size
+        except (TypeError, ValueError):
+            inner = _sizes(value, levels - 1) if levels > 1 and hasattr(value, "__dict__") else {}
+            sizes |= {f"{name}.{each}": size for each, size in inner.items()}
+    return sizes
 
 
 def _said(error: BaseException) -> str:
     """Return an exception in words, with the line of the user's file that raised it."""
     frames = [frame for frame in traceback.extract_tb(error.__traceback__) if frame.filename != __file__]
+    frames = [frame for frame in frames if "site-packages" not in frame.filename] or frames
     where = f" in line {frames[-1].lineno} of {Path(frames[-1].filename).name}" if frames else ""
     return f"{type(error).__name__}{f': {error}' if str(error) else ''}{where}"
 
@@ -116,29 +155,36 @@ def _call(folder: Path, plan: dict[str, Any], module: Any, owner: Any, function:
     outputs = np.empty((calls, identity.size))
     ends = np.cumsum([3, *(size for _, size in plan["fed"])])
     places = {name: slice(*ends[n : n + 2]) for n, (name, _) in enumerate(plan["fed"])}
-    ends = np.cumsum([0, *(size for _, size, _ in plan["results"])])
+    ends = np.cumsum([0, *(size for _, size, _, _ in plan["results"])])
     as_rotation, changed, target = _takes_rotation(function, plan), False, module
+    by_keyword: set[str] = set()
     state = identity
     for number, row in enumerate(rows):
         try:
             if row[0]:
                 state, target = _begin(plan, module, owner, identity)
             known = {name: row[place] for name, place in places.items()}
-            known |= {held: state[slice(*ends[n : n + 2])] for n, (_, _, held) in enumerate(plan["results"])}
-            known |= {"dt": row[1], "step": row[2]}
+            known |= {
+                held: state[slice(*ends[n : n + 2])] for n, (_, _, held, _) in enumerate(plan["results"])
+            }
+            known |= {"dt": row[1], "dt_ms": 1e3 * row[1], "dt_us": 1e6 * row[1], "step": row[2]}
+            known |= plan["constants"]
+            known["zeros"] = np.zeros(max(plan["zeros"], default=0))
             given: list[Any] = [
-                np.array(known[name], kind).reshape(shape) if shape else float(known[name])
-                for name, shape in plan["parameters"]
+                _given(known[name], shape, element, kind) for name, shape, element in plan["parameters"]
             ]
             before = [each.copy() if isinstance(each, np.ndarray) else each for each in given]
-            by_name = {name: each for (name, _), each in zip(plan["parameters"], given, strict=True)}
+            by_name = {name: each for (name, *_), each in zip(plan["parameters"], given, strict=True)}
             if as_rotation:
                 given[[*by_name].index("state")] = as_rotation(known["state"])
             bound = getattr(target, plan["function"].rpartition(".")[2]) if owner is not None else function
             if not number:
-                _require_fit(plan, bound, given)
-            named = dict(zip(plan["names"], given, strict=True)) if plan["names"] else {}
-            returned = bound(**named) if named else bound(*given)
+                by_keyword = _by_keyword(bound)
+            named = [*zip(plan["names"], given, strict=True)]
+            returned = bound(
+                *(each for name, each in named if name not in by_keyword),
+                **{name: each for name, each in named if name in by_keyword},
+            )
         except _RefusedError:
             raise
         except BaseException as error:
@@ -146,20 +192,33 @@ def _call(folder: Path, plan: dict[str, Any], module: Any, owner: Any, function:
             return
         outputs[number] = np.concatenate(_results(plan, module, target, returned, by_name))
         state = outputs[number].astype(kind)
-        in_place = [held for name, _, held in plan["results"] if name == held and returned is None]
+        in_place = [held for name, _, held, _ in plan["results"] if name == held and returned is None]
         changed |= any(
             isinstance(after, np.ndarray) and name not in in_place and after.tobytes() != kept.tobytes()
-            for (name, _), after, kept in zip(plan["parameters"], given, before, strict=True)
+            for (name, *_), after, kept in zip(plan["parameters"], given, before, strict=True)
         )
     outputs.tofile(folder / "output")
     _write(folder / "flags", str(2 * changed))
+
+
+def _given(numbers: Any, shape: list[int], element: int, kind: Any) -> Any:
+    """Return an argument: an array, one element of it, or a number."""
+    if element >= 0:
+        return float(numbers[element])
+    return (
+        np.array(numbers, kind).reshape(shape)
+        if shape
+        else numbers
+        if isinstance(numbers, bool)
+        else float(numbers)
+    )
 
 
 def _results(
     plan: dict[str, Any], module: Any, target: Any, returned: Any, given: dict[str, Any]
 ) -> list[Any]:
     """Return the numbers of all results: returned, several as a tuple, or changed in place, or read afterwards."""
-    returns = [name for name, _, _ in plan["results"] if not name.startswith(("self.", "global "))]
+    returns = [name for name, _, _, places in plan["results"] if not places]
     if len(returns) > 1 and returned is not None:
         if not isinstance(returned, tuple | list) or len(returned) != len(returns):
             raise _RefusedError(f"{plan['function']} is to return a tuple of {', '.join(returns)}")
@@ -167,24 +226,36 @@ def _results(
     else:
         several = dict.fromkeys(returns, returned)
     numbers = []
-    for name, size, held in plan["results"]:
-        if name.startswith("self."):
-            read = _attribute(target, name.removeprefix("self."))
-        elif name.startswith("global "):
-            read = _attribute(module, name.removeprefix("global "))
+    for name, size, held, places in plan["results"]:
+        if places:
+            of = [target if place.startswith("self.") else module for place in places]
+            read = [
+                _attribute(holder, place.removeprefix("self."))
+                for holder, place in zip(of, places, strict=True)
+            ]
+            read = read if len(read) > 1 else read[0]
         else:
             read = given[name] if returned is None and name == held else several[name]
         numbers.append(_numbers(plan, read, size))
     return numbers
 
 
+def _by_keyword(function: Any) -> set[str]:
+    """Return the names of those parameters that a call has to name."""
+    try:
+        parameters = inspect.signature(function).parameters.values()
+    except (TypeError, ValueError):  # built in
+        return set()
+    return {each.name for each in parameters if each.kind is each.KEYWORD_ONLY}
+
+
 def _takes_rotation(function: Any, plan: dict[str, Any]) -> Any:
     """Return what makes a Rotation of SciPy of a state, if the state of a function is annotated as one."""
     by_meaning = {
-        meaning: name for (meaning, _), name in zip(plan["parameters"], plan["names"], strict=False)
+        meaning: name for (meaning, *_), name in zip(plan["parameters"], plan["names"], strict=True)
     }
-    name = by_meaning.get("state")
-    if name is None or "Rotation" not in str(inspect.signature(function).parameters[name].annotation):
+    annotation = getattr(function, "__annotations__", {}).get(by_meaning.get("state"))
+    if "Rotation" not in str(annotation):
         return None
     from scipy.spatial.transform import Rotation
 
@@ -217,21 +288,6 @@ def _made(owner: Any) -> Any:
     except TypeError as error:
         raise _RefusedError(
             f"{owner.__name__}() raises {_said(error)}; --init NAME is a function of the module that makes the object"
-        ) from error
-
-
-def _require_fit(plan: dict[str, Any], function: Callable[..., Any], given: list[Any]) -> None:
-    """Refuse arguments that the function does not take."""
-    try:
-        signature = inspect.signature(function)
-    except (TypeError, ValueError):  # built in
-        return
-    try:
-        signature.bind(**dict.fromkeys(plan["names"])) if plan["names"] else signature.bind(*given)
-    except TypeError as error:
-        names = ", ".join(name for name, _ in plan["parameters"])
-        raise _RefusedError(
-            f"{plan['function']}{signature} does not take {names} of --arguments: {error}"
         ) from error
 
 

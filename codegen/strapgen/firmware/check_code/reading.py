@@ -5,8 +5,10 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
+from typing import Protocol
 
 from strapgen.firmware.check_code.foreign_arguments import (
+    ARGUMENTS_OF_RESULTS,
     CONSTANT,
     INTERVALS,
     MEMORY,
@@ -24,7 +26,7 @@ from strapgen.firmware.check_code.foreign_arguments import (
     read_arguments,
     require_consistent,
 )
-from strapgen.firmware.check_code.signature import Signature, SourceReader, Value
+from strapgen.firmware.check_code.signature import Signature, SourceFile, Value
 from strapgen.ir.checks import alternatives
 from strapgen.ir.exceptions import InputError
 
@@ -48,7 +50,22 @@ _DEGREES = re.compile(r"deg|dps")
 _OUT = re.compile(r"out|next|new|result")
 
 
-def joined(signature: Signature, text: str, reader: SourceReader) -> ForeignArguments:
+class Reader(Protocol):
+    """What tells which values a file has beside the parameters of its functions."""
+
+    file: SourceFile
+
+    def results(self, places: Iterable[str], before: Sequence[str] = ()) -> dict[str, Value]:
+        """Return what expressions are that are read after a call, by their text, without those that are nothing."""
+
+    def fields(self, name: str, before: Sequence[str]) -> list[tuple[str, bool]]:
+        """Return fields of an object and its methods that take nothing, each with whether it is public."""
+
+    def variables(self) -> list[str]:
+        """Return the names of the variables outside of functions."""
+
+
+def joined(signature: Signature, text: str, reader: Reader) -> ForeignArguments:
     """Return the arguments that a text names, with the parameters that carry each."""
     memories = [value.name for value in signature.parameters if value.is_object]
     stated = read_arguments(text, (*memories, *([MEMORY] if signature.owner else [])))
@@ -58,7 +75,9 @@ def joined(signature: Signature, text: str, reader: SourceReader) -> ForeignArgu
         parameters.append(ForeignArgument(MEMORY, (), signature.owner, "."))
     for argument in stated.parameters:
         if argument.name != MEMORY or not signature.owner:
-            parameters.append(_carried(signature, argument, left))
+            state = next((each for each in parameters if each.name == STATE and not each.type), argument)
+            shape = argument.shape or (state.shape if argument.name == NEXT else ())
+            parameters.append(_carried(signature, replace(argument, shape=shape), left))
     if left and not left[0].has_default:
         raise InputError(
             f"--arguments {text!r} leaves out `{left[0].text}` of {signature.name}; what it is has to be said, "
@@ -79,8 +98,13 @@ def joined(signature: Signature, text: str, reader: SourceReader) -> ForeignArgu
 def _carried(signature: Signature, argument: ForeignArgument, left: list[Value]) -> ForeignArgument:
     """Return an argument with the parameters that carry it, which are taken from those that are left."""
     if not left:
-        if argument.name in (NEXT, ROTATION, VELOCITY_CHANGE) and signature.returns is not None:
-            value = replace(signature.returns, passed="return")
+        returns, alone = signature.returns, (NEXT, ROTATION, VELOCITY_CHANGE)
+        if (
+            returns
+            and returns.elements
+            and argument.name in (ARGUMENTS_OF_RESULTS if returns.open else alone)
+        ):
+            value = replace(returns, passed="return")
             return _sized(argument, (value.holding(argument.size or _usual(argument)),))
         raise InputError(
             f"--arguments: {signature.name} takes no argument for {argument.name}; it takes "
@@ -95,10 +119,12 @@ def _carried(signature: Signature, argument: ForeignArgument, left: list[Value])
         if len(value.elements) != 1:
             raise InputError(f"--arguments: {argument.name} is `{value.text}`; one number is needed")
         return replace(argument, carriers=(value,))
-    if len(value.elements) == 1 and not value.open:
-        count = argument.size or _usual(argument)
+    count = argument.size or _usual(argument)
+    if len(value.elements) == 1 and (not value.open or together([value, *left]) == count):
         carriers = [value, *left[: count - 1]]
-        if len(carriers) < count or any(len(each.elements) != 1 or each.open for each in carriers):
+        if len(carriers) < count or any(
+            len(each.elements) != 1 or each.open != value.open for each in carriers
+        ):
             raise InputError(f"--arguments: {argument.name} needs {count} numbers from `{value.text}` on")
         del left[: count - 1]
         return _sized(argument, tuple(carriers))
@@ -128,12 +154,12 @@ def _sized(argument: ForeignArgument, carriers: tuple[Value, ...]) -> ForeignArg
         raise InputError(
             f"--arguments: {argument.name} is `{carriers[0].text}` with {count} numbers; {needed} are needed"
         )
-    shape = (count // 3, 3) if argument.name in (*SAMPLES, PREVIOUS, *PUSHES) else (count,)
-    return replace(argument, shape=shape, carriers=carriers)
+    shape = (count // 3, 3) if argument.name in (*SAMPLES, PREVIOUS, *PUSHES) and count > 3 else (count,)
+    return replace(argument, shape=argument.shape or shape, carriers=carriers)
 
 
 def _read_after(
-    signature: Signature, result: ForeignArgument, parameters: Sequence[ForeignArgument], reader: SourceReader
+    signature: Signature, result: ForeignArgument, parameters: Sequence[ForeignArgument], reader: Reader
 ) -> ForeignArgument:
     """Return a result that is a field of memory, or a global array, with the places of its numbers."""
     before, parts = places(result.name, parameters, reader)
@@ -144,6 +170,8 @@ def _read_after(
             f"{'' if len(parts) == 1 else f', for lack of {missing[0]}'}"
         )
     values = [replace(known[place], type="") for place in parts]
+    if len(values) == 1 and result.size:
+        values[0] = values[0].holding(result.size)
     if values[0].open or not values[0].elements:
         raise InputError(f"--arguments: the result {result.name} has no numbers that are known")
     if len(values) == 4:
@@ -151,9 +179,7 @@ def _read_after(
     return _sized(result, tuple(values))
 
 
-def places(
-    name: str, parameters: Sequence[ForeignArgument], reader: SourceReader
-) -> tuple[list[str], list[str]]:
+def places(name: str, parameters: Sequence[ForeignArgument], reader: Reader) -> tuple[list[str], list[str]]:
     """Return the declarations and the expressions of a result, one for each of its parts."""
     first, *rest = name.removeprefix("global ").split()
     owner, _, field = first.partition(".")
@@ -169,7 +195,7 @@ def variable(memory: ForeignArgument) -> str:
     return f"strapgen_at_{memory.name}"
 
 
-def declared(memory: ForeignArgument, reader: SourceReader) -> str:
+def declared(memory: ForeignArgument, reader: Reader) -> str:
     """Return the declaration of memory."""
     return f"extern {memory.type} {'&' if reader.file.is_cpp else ''}{variable(memory)};"
 
@@ -185,7 +211,7 @@ def _named_last(values: list[Value]) -> list[Value]:
 # Names
 
 
-def proposed(signature: Signature, reader: SourceReader, takes: str, is_angle_said: bool) -> str:
+def proposed(signature: Signature, reader: Reader, takes: str, is_angle_said: bool) -> str:
     """Return the arguments as their names and types say them; a name that says nothing is refused."""
     words, left, results = [], list(signature.parameters), []
     has_time = any(_TIME.match(value.name.lower()) for value in left)
@@ -239,10 +265,13 @@ def _role(value: Value, left: list[Value]) -> str:
     name, count = value.name.lower(), len(value.elements)
     if count == 0:
         return f"memory *{value.name}"
-    if count == 1 and not value.open:
+    if count == 1:
         if time := _TIME.match(name):
             return f"dt_{time[5]}" if time[5] in ("us", "ms") else "dt"
-        return _scalars(value, left)
+        if name == STEP:
+            return STEP
+        if not value.open or together([value, *left]) > 1:
+            return _scalars(value, left)
     if value.written and _ROTATIONS.search(name):
         return ROTATION
     if (count in (4, 9) or value.open) and _ATTITUDE.match(name):
@@ -251,23 +280,34 @@ def _role(value: Value, left: list[Value]) -> str:
     return found or (f"memory *{value.name}" if value.is_object and value.passed and value.written else "")
 
 
+def together(values: Sequence[Value]) -> int:
+    """Return how many of the first numbers belong together by their names: 4 of an attitude, 3 of a vector, or 1."""
+    names = [each.name.lower() for each in values[:4]]
+    for count, ends in ((4, ("0123", "wxyz", "xyzw")), (3, ("xyz",))):
+        heads = {name[:-1] for name in names[:count]}
+        if len(heads) == 1 and "".join(name[-1] for name in names[:count]) in ends:
+            return count
+    return 3 if names[:3] == [*"pqr"] else 1
+
+
 def _scalars(value: Value, left: list[Value]) -> str:
-    """Return what three numbers are whose names end in x, y, z, or p, q, r."""
-    names = [each.name.lower() for each in (value, *left[:2])]
-    head = names[0][:-1].rstrip("_")
-    along = len(names) == 3 and [name[-1] for name in names] == [*"xyz"]
-    if names != [*"pqr"] and not (along and all(name[:-1].rstrip("_") == head for name in names)):
-        return ""
-    role = "rates" if names == [*"pqr"] else _SCALARS.get(head) or _vector(replace(value, name=head))
+    """Return what numbers are that belong together by their names, and take the others from the ones that follow."""
+    name, count, role = value.name.lower(), together([value, *left]), ""
+    head = name[:-1].rstrip("_")
+    if count == 4 and (not head or _ATTITUDE.match(head)):
+        role = NEXT if value.written and _OUT.search(head) else STATE
+    elif count == 3:
+        role = "rates" if name == "p" else _SCALARS.get(head) or _vector(replace(value, name=head))
     if role:
-        del left[:2]
+        del left[: count - 1]
     return role
 
 
-def _found(signature: Signature, reader: SourceReader) -> str:
+def _found(signature: Signature, reader: Reader) -> str:
     """Return the attitude that a function leaves in what it returns, in memory, or in global numbers."""
-    if signature.returns is not None and len(signature.returns.elements) in (3, 4, 9):
-        return ROTATION if len(signature.returns.elements) == 3 else NEXT
+    returns = signature.returns
+    if returns is not None and returns.elements and (returns.open or len(returns.elements) in (3, 4, 9)):
+        return ROTATION if len(returns.elements) == 3 else NEXT
     memories = [ForeignArgument(MEMORY, (), signature.owner, ".")] if signature.owner else []
     memories += [
         ForeignArgument(value.name, (), value.type)
@@ -277,13 +317,12 @@ def _found(signature: Signature, reader: SourceReader) -> str:
     found = []
     for memory in memories:
         before, name = [declared(memory, reader)], variable(memory)
-        fields = [each for each in reader.fields(name, before) if _ATTITUDE.match(_last(each[0]))]
+        fields = reader.fields(name, before)
         public = _attitudes(reader, [field for field, is_public in fields if is_public], before, "")
         every = public or _attitudes(reader, [field for field, _ in fields], before, "")
         found += [each.replace(name, memory.name) for each in every]
     if not memories:
-        names = [name for name in reader.variables() if _ATTITUDE.match(_last(name))]
-        found = _attitudes(reader, names, [], "global ")
+        found = _attitudes(reader, reader.variables(), [], "global ")
     if len(found) != 1:
         several = f"may be {' or '.join(found)}" if found else "is nowhere that its name says"
         raise InputError(
@@ -297,14 +336,17 @@ def _last(name: str) -> str:
     return re.split(r"\.|::", name)[-1].removesuffix("()").lower()
 
 
-def _attitudes(reader: SourceReader, names: Iterable[str], before: Sequence[str], prefix: str) -> list[str]:
-    """Return those names that are attitudes, four numbers that belong together as one."""
-    known = reader.results(names, before)
+def _attitudes(reader: Reader, names: Sequence[str], before: Sequence[str], prefix: str) -> list[str]:
+    """Return those names that are attitudes, four numbers whose names belong together as one."""
+    known = reader.results([name for name in names if _ATTITUDE.match(_last(name))], before)
     found = [f"{prefix}{name}" for name, value in known.items() if len(value.elements) in (4, 9)]
-    single = [name for name, value in known.items() if len(value.elements) == 1]
-    if not found and len(single) == 4:
-        heads = [single[0], *(name.rpartition(".")[2] for name in single[1:])]
-        found = [prefix + " ".join(heads)]
+    for k in range(len(names) - 3) if not found else ():
+        four, parent = names[k : k + 4], names[k].rpartition(".")[0]
+        ends = [name.removeprefix(f"{parent}.") for name in four]
+        if together([Value(end, end) for end in ends]) == 4 and all(
+            len(value.elements) == 1 for value in reader.results(four, before).values()
+        ):
+            found.append(f"{prefix}{parent}{'.' * bool(parent)}{' '.join(ends)}")
     return found
 
 
@@ -319,8 +361,7 @@ def in_words(name: str, arguments: ForeignArguments, takes: str, unit: str) -> s
         if argument.reference == "." or any(value.passed == "return" for value in argument.carriers):
             continue
         said = ", ".join(value.name for value in argument.carriers)
-        lengths = argument.shape[argument.shape[:1] == (1,) :] if len(argument.shape) > 1 else argument.shape
-        shape = "".join(f"[{length}]" for length in lengths)
+        shape = "".join(f"[{length}]" for length in argument.shape)
         role = "memory" if argument.type else f"{argument.name}{shape}"
         role = f"{role} in {kinds[takes]}" if argument.name in SAMPLES else role
         role = f"{CONSTANT}{argument.text}" if argument.name == CONSTANT else role

@@ -66,7 +66,8 @@ class Value:
             return self
         length = count // len(self.elements)
         places = tuple(f"[{k}]{each}" for k in range(length) for each in self.elements)
-        return replace(self, shape=(length, *self.shape), passed="", elements=places)
+        passed = self.passed.replace("&", "")
+        return replace(self, shape=(length, *self.shape), passed=passed, elements=places, open=False)
 
 
 @dataclass(frozen=True)

@@ -24,7 +24,7 @@ from strapgen.catalogue.methods.coning_coefficients import Design
 from strapgen.firmware.check_code import ladder
 from strapgen.firmware.check_code.foreign import ForeignStep, Segment, SegmentRun
 from strapgen.firmware.check_code.foreign_arguments import POSITION, VELOCITY
-from strapgen.firmware.check_code.probes import AXES, BEFORE, LATE, Products, pairs, small_turn
+from strapgen.firmware.check_code.probes import AXES, BEFORE, LATE, Products, Table, pairs, small_turn
 from strapgen.lab.convergence import MOST_ERROR, Convergence, fitted
 from strapgen.lab.motions.motions import Motion, motion
 from strapgen.lab.motions.specific_forces import SpecificForce, force
@@ -66,6 +66,8 @@ class TurnedPush:
 
     #: The part that is odd under exchange: the sculling correction beside half of all products
     sculling: Products
+    #: Of an older sample i and a newer j the coefficients of d_i x v_j and of v_i x d_j, as those of sculling
+    sides: tuple[Table, Table]
     #: Mean of the even part over all products, and over those of one sample; 1/2 is right
     mean: float
     of_one_sample: float
@@ -286,6 +288,11 @@ class Velocity:
             for number, (_, _, axis, sign) in enumerate(AXES):
                 about[:, axis] += sign * odd[:, number, call, axis] / 2
             tables.append(dict(zip(known, about, strict=True)))
+        sides: tuple[Table, Table] = ({}, {})
+        for older, newer in pairs(count):
+            even = 1.0 if older < 0 else 0.5  # of an earlier call, its attitude turns the push
+            sides[0][older, newer] = float(tables[1][older, newer].mean()) - even
+            sides[1][older, newer] = even - (older < 0) - float(tables[1][newer, older].mean())
         now, end = (
             {
                 (older, newer): (table[older, newer] - (older < 0) - table[newer, older]) / 2
@@ -303,7 +310,7 @@ class Velocity:
             by_axis=tuple({pair: float(c[axis]) for pair, c in end.items()} for axis in range(3)),
             noise=noise,
         )
-        return TurnedPush(sculling, float(sums) / count**2, float(single), self._third_order())
+        return TurnedPush(sculling, sides, float(sums) / count**2, float(single), self._third_order())
 
     @property
     def _speed(self) -> float:

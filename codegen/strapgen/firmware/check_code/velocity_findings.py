@@ -37,6 +37,7 @@ END = "the force is turned by the attitude of the end of the step"
 START = "rotation of the increment absent: the force is turned by the attitude of the start of the step"
 TWICE = "rotation of the increment counted twice"
 OPPOSITE = "rotation of the increment of the wrong sign"
+NO_FAULT = "the coefficients of d_i x v_j are those of no single fault that is known"
 AT_THE_END = "the position advances by the velocity of the end of the step, not by the mean"
 AT_THE_START = "the position advances by the velocity of the start of the step, not by the mean"
 GRAVITY_SIGN = "gravity of the wrong sign"
@@ -79,6 +80,8 @@ class VelocityFindings:
         self.velocity = velocity
         self.step = velocity.step
         self.causes: list[str] = []
+        #: How sure the cause of wrong coefficients is, and what explains them next best
+        self.sure: tuple[float, str] | None = None
         self._known: dict[str, Any] = {}
         #: (3,): rotation vector by which a call turns the attitude of a resting body, reference axes
         self.frame: Array = np.zeros(3)
@@ -198,7 +201,7 @@ class VelocityFindings:
         holds = abs(turned.mean - 0.5) < allowed
         self._known["increment_rotation"] = 2 * turned.mean
         text = f"d x v has the coefficient {turned.mean:.4g} (0.5), d x (d x v) {turned.third:.3g} (0.1667)"
-        if not holds:
+        if not holds and self._one_sided(turned) is None:
             self.causes.append(_cause_of_rotation(turned, self.step.samples))
         return Finding("turned push", holds, text, 2 * turned.mean, allowed)
 
@@ -208,12 +211,25 @@ class VelocityFindings:
         shown = coning_causes.measured(known)
         self._known["sculling_coefficients"] = shown
         self._known["sculling_ratio"] = ratio = coning_causes.ratio(known)
-        if said := coning_causes.cause(known):
-            self.causes.append(f"sculling {said}" if said.startswith("correction") else f"sculling: {said}")
-        text = f"{coning_causes.in_words(shown, 'v')}; {ratio:.3f} of what sculling needs"
-        return Finding(
-            "sculling", coning_causes.corrects_coning(known), text, ratio, coning_causes.tolerance(known)
-        )
+        one_sided = self._one_sided(turned)
+        said = one_sided or coning_causes.cause(known)
+        if said:
+            self.causes.append(
+                f"sculling{' ' if said.startswith('correction') else ': '}{said}".replace(
+                    "coning", "sculling"
+                )
+            )
+            self.sure = None if one_sided else coning_causes.confidence(known, said)
+        holds = coning_causes.corrects_coning(known)
+        text = coning_causes.in_words(known, "sculling")
+        return Finding("sculling", holds, text, ratio, coning_causes.tolerance(known))
+
+    def _one_sided(self, turned: TurnedPush) -> str | None:
+        """Return the cause where of the products d_i x v_j and v_i x d_j one alone is wrong."""
+        known = turned.sculling
+        if abs(turned.of_one_sample - 0.5) > _MEAN_WITHIN + known.noise:
+            return None
+        return coning_causes.one_sided(turned.sides, 2 * known.noise, known.samples)
 
     def _motions(self, standard: Design) -> Iterator[Finding]:
         """Yield the findings on the orders, and on the drift of the velocity."""
@@ -245,8 +261,9 @@ class VelocityFindings:
         hidden = self.velocity.rounding_of_drift()
         samples = ladder.samples_in_words(standard)
         text = f"{size:.4g} m/s^2; closed form on {samples} {closed:.4g}, generated {generated:.4g}"
+        text += f"; limit {least + hidden:.4g}"
         if hidden > least / 100:
-            text += f"; {self.step.source.precision} precision hides {hidden:.2g}"
+            text += f", of which {self.step.rounding} hides {hidden:.2g}"
         return Finding("velocity drift", size <= least + hidden, text, size, least + hidden)
 
 
@@ -270,6 +287,8 @@ def _cause_of_rotation(turned: TurnedPush, samples: int) -> str:
     )
     mean = turned.of_one_sample if one_by_one else turned.mean
     third = (samples + 1) * (2 * samples + 1) / (12 * samples**2) if one_by_one else 0.5
+    if not one_by_one and abs(turned.of_one_sample - 0.5) < _MEAN_WITHIN:
+        return f"{NO_FAULT}: their mean is {turned.mean:.4g}, that of a sample with itself is right"
     if abs(mean - 1) < SIZE_WITHIN:
         return END if abs(turned.third - third) < _THIRD_WITHIN else TWICE
     if abs(mean) < SIZE_WITHIN:

@@ -10,11 +10,12 @@ from collections.abc import Collection, Iterable, Mapping, Sequence
 from fractions import Fraction
 from functools import lru_cache
 
-from strapgen.fixedpoint.floating import proved
+from strapgen.fixedpoint.floating import any_order, proved
 from strapgen.fixedpoint.floating.errors import (
     NUMBERS,
     Expressions,
     NoBoundError,
+    NumberFormat,
     added_errors,
     sensitivities,
     slopes,
@@ -24,7 +25,7 @@ from strapgen.fixedpoint.intervals import Interval, norm
 from strapgen.fixedpoint.quantities import up
 from strapgen.ir import checks
 from strapgen.ir.fixed_settings import ROTATION_INPUTS, Settings
-from strapgen.ir.interfaces import Condition, RoundingAccumulation, RoundingBounds, StepRounding
+from strapgen.ir.interfaces import AnyOrder, Condition, RoundingAccumulation, RoundingBounds, StepRounding
 from strapgen.ir.program import Operation, Program, Result, walk
 
 #: The functions of the C library that operations call.
@@ -157,7 +158,41 @@ def _bounds(program: Program, limits: tuple[tuple[str, Fraction], ...], number: 
         outputs,
         step,
         None if step is None else _accumulation(program, dict(limits), step, *outputs.values()),
+        any_order=_in_any_order(
+            program, analysis, format_, outputs if left_out or analysis.expressions.remainders else {}
+        ),
     )
+
+
+def _in_any_order(
+    program: Program, analysis: _Analysis, number: NumberFormat, beside: Mapping[str, Sequence[Fraction]]
+) -> AnyOrder:
+    """Bound the outputs in any order of the operations; what series leave out is part of the errors `beside` it."""
+    try:
+        values = any_order.AnyOrder(program, analysis.expressions, analysis.ranges, number)
+        errors = {
+            result.signal.name: tuple(map(values.error, analysis.expressions.results[result.signal.name]))
+            for result in program.outputs
+        }
+    except NoBoundError as error:
+        return AnyOrder(without=str(error))
+    for name, each in beside.items():
+        errors[name] = tuple(a + b for a, b in zip(errors[name], each, strict=True))
+    is_step = program.attitude_step is not None and program.transition is not None and len(errors) == 1
+    per_step = _longest_row(program, *errors.values()) if is_step else None
+    return AnyOrder(errors, per_step, values.roundings, values.approximates)
+
+
+def _longest_row(program: Program, errors: Sequence[Fraction]) -> Fraction:
+    """Return the length of an error of the state, or of a row of a matrix."""
+    width = _row(program)
+    return up(max(norm(errors[k : k + width]) for k in range(0, len(errors), width)))
+
+
+def _row(program: Program) -> int:
+    """Return the number of elements of the state, or of a row of a matrix."""
+    state = program.inputs[0]
+    return state.size // (state.shape[0] if len(state.shape) == 2 else 1)
 
 
 def _has_numpy() -> bool:
@@ -214,10 +249,10 @@ def _accumulation(
     """
     state, transition = program.inputs[0], program.transition
     assert transition is not None
-    width = state.size // (state.shape[0] if len(state.shape) == 2 else 1)
+    width = _row(program)
     length = largest[state.name] * norm([Fraction(1)] * width)
     rows = range(0, state.size, width)
-    whole = max(norm(errors[k : k + width]) for k in rows)
+    whole = _longest_row(program, errors)
     parts = max(norm(step.local[k : k + width]) for k in rows) + length * norm(step.transition)
     sizes = tuple(largest[signal.name] for signal in program.inputs[1:] for _ in signal.elements)
     from strapgen.fixedpoint.accumulation import transition_growth

@@ -253,8 +253,8 @@ class _ComputedNumbers:
 
     def _divide(self, place: int, expression: Expression) -> tuple[Fraction, Fraction]:
         numerator, divisor = (self.items[k] for k in expression.arguments)
-        exact = _least_magnitude(self.ranges[expression.arguments[1]])
-        computed = _least_magnitude(divisor.range)
+        exact = least_magnitude(self.ranges[expression.arguments[1]])
+        computed = least_magnitude(divisor.range)
         if not exact or not computed:
             raise NoBoundError(f"the divisor in {self.expressions.labels[place]} may be computed as zero")
         change = numerator.error + self.ranges[place].magnitude * divisor.error
@@ -366,7 +366,7 @@ class _ComputedNumbers:
 
     def _places(self, expression: Expression, computed: Interval) -> int | None:
         """Return the exponent of a power of two that divides the computed numbers; None where they come near zero."""
-        least = _least_magnitude(computed)
+        least = least_magnitude(computed)
         candidates = [exponent(least) - self.number.precision + 1] if least else []
         common = self._common_place(expression)
         return max(candidates if common is None else [common, *candidates], default=None)
@@ -409,7 +409,7 @@ def _lowest_bit(value: Fraction) -> int | None:
     return (top & -top).bit_length() - value.denominator.bit_length()
 
 
-def _least_magnitude(interval: Interval) -> Fraction:
+def least_magnitude(interval: Interval) -> Fraction:
     """Return the smallest magnitude of a number inside."""
     if interval.low <= 0 <= interval.high:
         return _ZERO
