@@ -194,6 +194,7 @@ LOOPS = {
     "heading-loop": _recipe("heading loop of second order", _LOOPS, "heading_loop"),
     "heading-from-dcm": _recipe("heading of an attitude", _LOOPS, "heading_of_attitude"),
     "vertical-loop": _recipe("vertical loop of third order", _LOOPS, "vertical_loop"),
+    "height-hysteresis": _recipe("hysteresis of the feedback of a height", _LOOPS, "height_hysteresis"),
     "pulse-torque": _recipe("control law of a pulse torquing loop", _PULSES, "pulse_torque"),
     "body-feedback": _recipe("feedback of the loops in body axes", _LOOPS, "body_feedback"),
 }
