@@ -30,6 +30,12 @@ SAMPLING = {
     "velocity-counts": _recipe(
         "velocity increments from counts", "systems.sampling", "scaled_counts", "velocity"
     ),
+    "interpolated-integral": _recipe(
+        "integral from a sample to a time, by a polynomial", "preintegration.interpolation", "integral"
+    ),
+    "interpolated-mean": _recipe(
+        "mean over an interval from samples, by a polynomial", "preintegration.interpolation", "mean"
+    ),
 }
 
 _TWO_SPEED = "two_speed.two_speed_loops"
