@@ -117,7 +117,7 @@ class Measured:
     constant: float
     #: Largest output after the input has become zero, once settled
     rest: float
-    #: Certified bound of the error in a run of any length; None in floating point
+    #: Certified bound of the error in a run of any length, and so of a limit cycle; None in floating point
     bound: float | None
     #: What a bit of the output is worth; None in floating point
     unit: float | None

@@ -7,6 +7,7 @@ import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
+from functools import reduce
 from typing import Any
 
 from strapgen.catalogue.methods.sensor_response import Response
@@ -94,38 +95,38 @@ class Section:
         return width, width * self.cross / self.square
 
     @property
+    def _recursion(self) -> tuple[Fraction, Fraction]:
+        """The coefficients a1 and a2 of the transfer function in 1/z."""
+        if self.loss is None:
+            return 2 * self.square - 1, Fraction(0)
+        own, other = 1 - 2 * self.loss, 1 - 2 * self.square
+        return -own - other, own * other + 4 * self.enter * self.cross
+
+    @property
     def denominator(self) -> tuple[Fraction, ...]:
         """Coefficients 1, a1 and a2 of the transfer function in 1/z."""
-        if self.loss is None:
-            return Fraction(1), 2 * self.square - 1
-        own, other = 1 - 2 * self.loss, 1 - 2 * self.square
-        return Fraction(1), -own - other, own * other + 4 * self.enter * self.cross
+        return Fraction(1), *self._recursion[: len(self.states)]
 
     @property
     def numerator(self) -> tuple[Fraction, ...]:
         """Coefficients b of the transfer function in 1/z, which follow from the gains."""
-        _, a1, *rest = self.denominator
-        a2 = rest[0] if rest else Fraction(0)
-        low, high = self.low * (1 + a1 + a2), self.high * (1 - a1 + a2)
-        if not rest:
+        a1, a2 = self._recursion
+        low, high, odd = self.low * (1 + a1 + a2), self.high * (1 - a1 + a2), self.centre * (1 - a2)
+        if self.loss is None:
             return (low + high) / 2, (low - high) / 2
-        odd = self.centre * (1 - a2)
         return (low + high) / 4 + odd / 2, (low - high) / 2, (low + high) / 4 - odd / 2
 
     def require_stable(self) -> None:
         """Refuse poles on or outside the unit circle, by the criterion of Jury in rational numbers."""
-        _, a1, *rest = self.denominator
-        a2 = rest[0] if rest else Fraction(0)
+        a1, a2 = self._recursion
         if not (abs(a1) < 1 + a2 and a2 < 1):
             raise InputError("a pole is on or outside the unit circle; all must be inside")
 
     @property
     def radius(self) -> float:
         """Largest magnitude of a pole."""
-        _, a1, *rest = map(float, self.denominator)
-        if not rest:
-            return abs(a1)
-        root = cmath.sqrt(a1 * a1 - 4 * rest[0])
+        a1, a2 = map(float, self._recursion)
+        root = cmath.sqrt(a1 * a1 - 4 * a2)
         return max(abs(a1 + root), abs(a1 - root)) / 2
 
     @property
@@ -258,11 +259,15 @@ class Cascade:
         return sum(one.prototype.delay(False, float(self.sample_hz)) for one in self.sections)
 
 
-def _product(several: Iterable[Sequence[Fraction]]) -> list[Fraction]:
-    found = [Fraction(1)]
-    for one in several:
-        found = convolved(found, one)
-    return found
+def _product(several: Iterable[Sequence[Fraction]]) -> Sequence[Fraction]:
+    return reduce(_convolved, several, [Fraction(1)])
+
+
+def _convolved(one: Sequence[Fraction], other: Sequence[Fraction]) -> list[Fraction]:
+    """Return the product of two polynomials."""
+    places = range(len(one) + len(other) - 1)
+    pairs = [(i + j, a * b) for i, a in enumerate(one) for j, b in enumerate(other)]
+    return [sum((x for place, x in pairs if place == k), Fraction(0)) for k in places]
 
 
 # Designs
@@ -375,25 +380,15 @@ def _count(roots: Sequence[Root]) -> int:
 
 def _section(poles: list[Root], zeros: list[Root], sample_hz: Fraction) -> Prototype:
     """Return a section of monic polynomials in z."""
-    order, top = _count(poles), _polynomial(zeros)
-    _, a1, a2 = (*_polynomial(poles), Fraction(0))[:3]
+    order = _count(poles)
+    top, below = (
+        _product([Fraction(1), -2 * r, r**2 + i**2] if i else [Fraction(1), -r] for r, i in roots)
+        for roots in (zeros, poles)
+    )
+    _, a1, a2 = (*below, Fraction(0))[:3]
     b0, b1, b2 = (*(Fraction(0),) * (order + 1 - len(top)), *top, Fraction(0))[:3]
     half, rest = 1 - a1 + a2, 1 + a1 + a2
     square = rest / half
     hertz = float(sample_hz) / math.pi * math.atan(square if order == 1 else math.sqrt(square))
     width = None if order == 1 else 2 * (1 - a2) / half
     return Prototype(hertz, square, width, (b0 - b1 + b2) / half, (b0 - b2) / (1 - a2), (b0 + b1 + b2) / rest)
-
-
-def _polynomial(roots: Sequence[Root]) -> tuple[Fraction, ...]:
-    """Return the coefficients of a monic polynomial, those of the highest power first."""
-    return tuple(_product([Fraction(1), -2 * r, r**2 + i**2] if i else [Fraction(1), -r] for r, i in roots))
-
-
-def convolved(one: Sequence[Fraction], other: Sequence[Fraction]) -> list[Fraction]:
-    """Return the product of two polynomials."""
-    found = [Fraction(0)] * (len(one) + len(other) - 1)
-    for i, a in enumerate(one):
-        for j, b in enumerate(other):
-            found[i + j] += a * b
-    return found
