@@ -28,6 +28,9 @@ from strapgen.navigation.filters.filter_file import Filter, read
 from strapgen.navigation.filters.filter_study import OutputFilter, decibels
 from strapgen.navigation.filters.proof import bounds, cycle
 from strapgen.navigation.filters.sections import Section
+from strapgen.navigation.systems.system_file import parsed
+from strapgen.navigation.systems.system_runner import system_runner
+from strapgen.navigation.systems.wiring import wired
 from strapgen.run.backends import BACKENDS
 
 FILES = Path(__file__).resolve().parents[2] / "examples" / "filters"
@@ -352,6 +355,37 @@ def test_a_filter_runs_alike_on_every_back_end(backend, rng):
         assert np.array_equal(found, expected)
     else:
         np.testing.assert_allclose(found, expected, atol=1e-4 if "float" in backend else 1e-12)
+
+
+def system_tables(every: int = 1, **stage: str) -> dict:
+    """Return a system with a filter as its one stage, or with other keys of it."""
+    keys = {"layout": str(FILES / "roll-notch.toml")} | stage
+    one = {"name": "notch", "kernel": "filter", "every": every, "wires": {"sample": "rate"}} | keys
+    inputs = {"rate": {"unit": "rad/s", "frame": "b", "range": 8}}
+    return {"sample_hz": 50, "inputs": inputs, "stage": [one], "outputs": ["notch.filtered"]}
+
+
+@pytest.mark.parametrize("backend", ["numpy", pytest.param("c-fixed16", marks=pytest.mark.long)])
+def test_a_described_system_takes_a_filter(backend, rng):
+    samples = rng.uniform(-8, 8, (100, 3))
+    values = system_runner(wired(parsed(system_tables())), backend).run({"rate": samples}).values
+    one = described("roll-notch")
+    expected = independent.lfilter(one.numerator, one.denominator, samples, axis=0)
+    allowed = 1e-12 if backend == "numpy" else 0.1
+    np.testing.assert_allclose(values["notch_filtered"], expected, atol=allowed)
+
+
+@pytest.mark.parametrize(
+    ("tables", "said"),
+    [
+        (system_tables(2), "roll-notch.toml is for 50 samples in a second; the stage has 25"),
+        (system_tables(layout="absent.toml"), "stage notch: absent.toml cannot be read"),
+        (system_tables(kernel="sum-3"), "stage notch: sum-3 takes no layout"),
+    ],
+)
+def test_a_stage_with_a_wrong_filter_is_refused(tables, said):
+    with pytest.raises(InputError, match=said):
+        wired(parsed(tables))
 
 
 # Proofs

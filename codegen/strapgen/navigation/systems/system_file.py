@@ -52,6 +52,7 @@ class StageText:
     increments: int | None
     previous: int | None
     ahead: int | None
+    layout: str | None
     word: int | None
     carry: str
     wires: Mapping[str, str]
@@ -65,7 +66,9 @@ class StageText:
     @property
     def options(self) -> dict[str, Any]:
         """The arguments of `catalogue.choose` beside the name."""
-        stated = {name: getattr(self, name) for name in ("method", "increments", "previous", "ahead")}
+        stated = {
+            name: getattr(self, name) for name in ("method", "increments", "previous", "ahead", "layout")
+        }
         return {name: value for name, value in stated.items() if value is not None}
 
 
@@ -189,6 +192,9 @@ class StageFile:
     increments: Annotated[int | None, Key("Samples of a step", "1")] = None
     previous: Annotated[int | None, Key("Samples from before it", "1")] = None
     ahead: Annotated[int | None, Key("Samples from after it", "1")] = None
+    layout: Annotated[
+        str | None, Key("File of a kernel that is made from one, such as filter; as for generate")
+    ] = None
     word: Annotated[
         int | None,
         Key(

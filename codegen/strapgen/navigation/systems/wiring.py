@@ -88,6 +88,8 @@ described = read_system
 def wired(text: SystemText) -> Description:
     """Return a described system with its stages wired; parameters and errors are those of `read_system`."""
     stages = [ports(stage, place) for place, stage in enumerate(text.stages)]
+    for stage in stages:
+        _check_rate(stage, text.sample_hz / stage.text.every)
     wiring = _Wiring(text, stages)
     wiring.run()
     names = [stage.name for stage in stages]
@@ -107,6 +109,16 @@ def wired(text: SystemText) -> Description:
         dict(zip(names, (stage.text.ranges for stage in stages), strict=True)),
         dict(zip(names, (stage.text.formats for stage in stages), strict=True)),
     )
+
+
+def _check_rate(stage: Ports, stage_hz: Fraction) -> None:
+    """Refuse a stage whose file is for another rate."""
+    file_hz = getattr(stage.choice.layout, "sample_hz", stage_hz)
+    if file_hz != stage_hz:
+        raise InputError(
+            f"stage {stage.name}: {stage.text.layout} is for {float(file_hz):g} samples in a second; the stage has "
+            f"{float(stage_hz):g}"
+        )
 
 
 @dataclass
