@@ -218,13 +218,14 @@ def test_lost_measurements_change_nothing_and_runs_are_independent():
         name: np.stack([values, np.where(np.arange(40) % 3, values, np.nan)])
         for name, values in measured.items()
     }
-    model = filter_of(LINE)
-    both, whole = model.run(lost, inputs), model.run(measured, inputs)
+    model, start = filter_of(LINE), [100.0, 10, 0.1]
+    both, whole = (model.run(one, inputs, initial=start) for one in (lost, measured))
     np.testing.assert_array_equal(both.states[0], whole.states)
     np.testing.assert_array_equal(both.innovations["fix"][0], whole.innovations["fix"])
     assert np.isnan(both.innovations["pulses"][1, ::3]).all()
-    coasting = model.run({name: np.full(40, np.nan) for name in measured}, inputs)
-    np.testing.assert_allclose(both.states[1, 1], coasting.states[1])
+    coasting = model.run({name: np.full(40, np.nan) for name in measured}, inputs, initial=start)
+    np.testing.assert_array_equal(both.states[1, 1], coasting.states[1])
+    np.testing.assert_array_equal(both.covariances[1, 1], coasting.covariances[1])
 
 
 def gyrocompass(**words: str) -> KalmanFilter:
@@ -306,15 +307,17 @@ def test_a_steady_gain_has_its_closed_form():
 
 
 def test_steady_gains_solve_the_riccati_equation_of_scipy():
-    model = gyrocompass(**{'"scheduled"': '"steady"', "deviation = 1e-2": "deviation = 1e-2\nevery = 5"})
-    Phi = np.array(model.transition, float)
-    H, Q = np.array(model.H, float), np.array(model.Q, float)
+    changes = {"scale*push - scale*bias": "-bias", "scale*speed": "speed", PUSH: "", SCALE: ""}
+    words = {'"online"': '"steady"', 'deviation = "1/5"': 'deviation = "1/5"\nevery = 4'}
+    model = filter_of(LINE, **changes, **words)
+    Phi, H, Q = (np.array(one, float) for one in (model.transition, model.H, model.Q))
     power, noise = np.eye(3), np.zeros((3, 3))
-    for _ in range(5):
+    for _ in range(4):
         power, noise = Phi @ power, Phi @ noise @ Phi.T + Q
-    before = solve_discrete_are(power.T, H.T, noise, 1e-4 * np.eye(2))
-    after = np.linalg.inv(np.linalg.inv(before) + H.T @ H / 1e-4)
-    np.testing.assert_allclose(np.array(model.solved.deviations, float), np.sqrt(np.diag(after)), rtol=1e-6)
+    R = np.diag([9, 0.04])
+    before = solve_discrete_are(power.T, H.T, noise, R)
+    after = np.linalg.inv(np.linalg.inv(before) + H.T @ np.linalg.inv(R) @ H)
+    np.testing.assert_allclose(np.array(model.solved.deviations, float), np.sqrt(np.diag(after)), rtol=1e-8)
 
 
 def test_scheduled_gains_are_those_of_the_recursion_to_the_digits():
