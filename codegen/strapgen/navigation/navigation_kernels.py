@@ -173,6 +173,12 @@ OUTPUTS = {
     },
 }
 
+#: Kernels of the modes of a reference.
+MODES = {
+    "hysteresis": _recipe("switch with two thresholds", "modes", "hysteresis"),
+    "mode-sequence": _recipe("sequence of off, align, navigate, attitude", "modes", "mode_sequence"),
+}
+
 #: Kernels of an attitude held as two rows of its direction cosine matrix.
 TWO_ROWS = {
     "dcm-two-rows-update": _recipe("two rows: update by a rotation vector", _STEPS, "update"),
@@ -194,6 +200,9 @@ LOOPS = {
     "heading-loop": _recipe("heading loop of second order", _LOOPS, "heading_loop"),
     "heading-from-dcm": _recipe("heading of an attitude", _LOOPS, "heading_of_attitude"),
     "vertical-loop": _recipe("vertical loop of third order", _LOOPS, "vertical_loop"),
+    "tuned-rotor-loop": _recipe(
+        "loop of a tuned-rotor gyro with rate observer", "instruments.tuned_rotor", "tuned_rotor_loop"
+    ),
     "pulse-torque": _recipe("control law of a pulse torquing loop", _PULSES, "pulse_torque"),
     "body-feedback": _recipe("feedback of the loops in body axes", _LOOPS, "body_feedback"),
 }
@@ -207,6 +216,7 @@ KERNELS = {
     **NAVIGATION,
     **REDUNDANCY,
     **OUTPUTS,
+    **MODES,
     **TWO_ROWS,
     **LOOPS,
 }

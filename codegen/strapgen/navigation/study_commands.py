@@ -458,7 +458,8 @@ def study_pulse_torque(
             "--set",
             metavar="KEY=VALUE...",
             help="Constants: gain, lag_gain, lag_pole, integral_gain, leak, quantum_arcsec, lag_s, cycle_hz, "
-            "largest_deg_s, largest_pulses, delay_cycles.  [default: those of a fit to the printed responses]",
+            "largest_deg_s, largest_pulses, delay_cycles, asymmetry_ppm.  [default: those of a fit to the printed "
+            "responses]",
             panel="Input",
             words="strapgen.navigation.torquing:TorqueLoop",
         ),
@@ -468,7 +469,8 @@ def study_pulse_torque(
     """Run a pulse torquing loop beside the figures of its source.
 
     You see rise, overshoot, offset, bandwidth and the angle under an angular acceleration, for the linear loop and for
-    one with quanta and limits, beside what the source prints. A loop that is unstable is refused.
+    one with quanta and limits, beside what the source prints; and the power and drift of binary and ternary torquing.
+    A loop that is unstable is refused.
 
     Example: strapgen study pulse-torque --plot out/pulse-torque.png
     """
