@@ -365,6 +365,18 @@ def test_the_transition_is_exact_where_the_series_ends():
     )
 
 
+@pytest.mark.parametrize("order", [1, 2, 4])
+def test_what_a_series_leaves_out_is_bounded(order):
+    model = filter_of(LINE, **{"order = 8": f"order = {order}", "interval = 0.25": "interval = 4"})
+    F, ranges = np.array([[0, 1, 0], [0, 0, -2], [0, 0, -1 / 50]]), np.array([5000, 100, 1])
+    series, term = np.eye(3), np.eye(3)
+    for j in range(1, order + 1):
+        term = term @ F * 4 / j
+        series = series + term
+    left = (np.abs(expm(F * 4) - series) * ranges / ranges[:, None]).sum(axis=1).max()
+    assert left <= model.left_out < 1.2 * left
+
+
 def test_observability_names_what_no_measurement_shows():
     model = filter_of(LINE, **{'"place"\ndeviation = 3': '"speed"\ndeviation = 3'})
     assert (model.observability.rank, model.observability.unobservable) == (2, ("place 1",))
