@@ -11,6 +11,7 @@ import math
 import re
 from collections.abc import Iterator
 from fractions import Fraction
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -51,7 +52,12 @@ NAMED = [
         [*NAVIGATION, *REDUNDANCY, *LOOPS, *COMPENSATION, *OUTPUTS, *MODES, *TWO_ROWS, *TRANSLATIONS]
     )
 ]
-MORE = [*NAMED, *VECTORS]
+#: Filters of every kind of section, which bring their ranges.
+FILTERS = [
+    choose("filter", layout=path)
+    for path in sorted((Path(__file__).resolve().parents[1] / "examples" / "filters").iterdir())
+]
+MORE = [*NAMED, *VECTORS, *FILTERS]
 EVERY = [*FIXED_POINT, *(choice for choice in MORE if choice not in FIXED_POINT)]
 #: What is compiled in the quick tests: sums, roots, functions, quotients, recursions with error feedback, steps.
 COMPILED = (
@@ -135,7 +141,7 @@ def share_of_range(kernel: str, signal: str, states: list[str]) -> Fraction:
         return Fraction(1, 16)
     if kernel in LOOPS and (signal in states or signal.startswith(("reference", "magnetic"))):
         return Fraction(1, 4)  # no corner has two headings half a turn apart, where the error jumps
-    if signal in ("sample", "first", "second", "sensed"):
+    if signal.startswith(("sample", "first", "second", "sensed")):
         return Fraction(1, 4)
     if kernel == "flight-path-angle":  # slow, where the error is largest
         return Fraction(1, 256)

@@ -30,6 +30,12 @@ SAMPLING = {
     "velocity-counts": _recipe(
         "velocity increments from counts", "systems.sampling", "scaled_counts", "velocity"
     ),
+    "interpolated-integral": _recipe(
+        "integral from a sample to a time, by a polynomial", "preintegration.interpolation", "integral"
+    ),
+    "interpolated-mean": _recipe(
+        "mean over an interval from samples, by a polynomial", "preintegration.interpolation", "mean"
+    ),
 }
 
 _TWO_SPEED = "two_speed.two_speed_loops"
@@ -100,6 +106,16 @@ LAYOUTS = {
     ),
 }
 
+#: The kernel of a filter that a file describes.
+FILTERS = {
+    "filter": _recipe(
+        "lag, lead-lag, notch, low pass or cascade, of a filter file",
+        "filters.filter_kernels",
+        "cascade",
+        reader="strapgen.navigation.filters.filter_file:read",
+    ),
+}
+
 _RATES, _STEPS, _GEOGRAPHIC = "frame.frame_rates", "frame.navigation_steps", "frame.geographic"
 #: Kernels of the navigation frame: its rate, gravity, velocity and position, and its alignment.
 NAVIGATION = {
@@ -156,7 +172,7 @@ REDUNDANCY = {
 
 #: Kernels of what a navigator shows: filtered rates, magnetic heading, track angle, axes.
 OUTPUTS = {
-    "butterworth-2": _recipe("low-pass filter of second order", "outputs", "butterworth"),
+    "butterworth-2": _recipe("low-pass filter of second order", "filters.filter_kernels", "butterworth"),
     "variation": _recipe("magnetic variation between four points", "outputs", "variation"),
     "magnetic-heading": _recipe("heading by the magnetic variation", "outputs", "magnetic_heading"),
     "track-angle": _recipe("direction of the ground velocity", "outputs", "track_angle"),
@@ -213,6 +229,7 @@ KERNELS = {
     **TWO_SPEED_LOOPS,
     **COMPENSATION,
     **LAYOUTS,
+    **FILTERS,
     **NAVIGATION,
     **REDUNDANCY,
     **OUTPUTS,

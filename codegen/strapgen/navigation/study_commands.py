@@ -12,7 +12,7 @@ from typing import Annotated, Any, ClassVar
 import typer
 
 from strapgen.cli.fixed_options import FixedOptions
-from strapgen.cli.option_groups import Needs, OneOf, Shown, grouped, rules
+from strapgen.cli.option_groups import Excludes, Needs, OneOf, Shown, grouped, rules
 from strapgen.cli.options import Duration, FastBackends, OneBackend, Processor, a_backend, option
 from strapgen.cli.output import Output
 from strapgen.cli.progress import track
@@ -253,7 +253,16 @@ def study_attitude_form(
 
 
 @grouped
+@rules(Excludes("FILE", "--cutoff-hz --sample-hz --largest", reason="FILE states the filter"))
 def study_output_filter(
+    file: Annotated[
+        Path | None,
+        typer.Argument(
+            metavar="FILE",
+            help="TOML file with a filter.  [default: a Butterworth filter of second order]",
+            show_default=False,
+        ),
+    ] = None,
     *,
     cutoff_hz: Annotated[
         Positive, option("--cutoff-hz", metavar="HZ", help="Edge, which is damped by 3 dB.", panel="Filter")
@@ -268,11 +277,15 @@ def study_output_filter(
         ),
     ] = Positive("128"),
     frequencies: Annotated[
-        tuple[Number, ...],
+        tuple[Number, ...] | None,
         option(
-            "--frequency-hz", metavar="HZ,...", help="Frequencies that are measured, with sines.", panel="Run"
+            "--frequency-hz",
+            metavar="HZ,...",
+            help="Frequencies that are measured, with sines.  [default: 0.32,1,3.2,8,10,20; of a file its corners, "
+            "half and twice of each]",
+            panel="Run",
         ),
-    ] = tuple(map(Number, ("0.32", "1", "3.2", "8", "10", "20"))),
+    ] = None,
     backend: Annotated[
         tuple[str, ...],
         option(
@@ -285,22 +298,32 @@ def study_output_filter(
     ] = ("c", "c-fixed32", "c-fixed16"),
     output: Output,
 ) -> None:
-    """Measure a Butterworth filter of second order on several back ends, beside its analog and digital response.
+    """Measure a filter on several back ends, beside its analog and digital response.
 
     You also see the error after the filter has settled, for a constant input and for none, without and with error
-    feedback in fixed point, and its bound in a run of any length.
+    feedback in fixed point, and its bound in a run of any length, which no limit cycle exceeds. The filter is that of a
+    file, or a Butterworth filter of second order.
 
     Example: strapgen study output-filter --cutoff-hz 8 --sample-hz 100
-    """
-    output.check()
-    from strapgen.navigation import output_filter as experiment
-    from strapgen.navigation.output_filter import FilterResult, OutputFilter
 
-    edge, size = OutputFilter(float(cutoff_hz), float(sample_hz)), float(largest)
-    tones = experiment.check_frequencies(edge, [*map(float, frequencies)])
+    Example: strapgen study output-filter examples/filters/roll-notch.toml --frequency-hz 1,9.5,15
+    """
+    output.check(file)
+    from strapgen.navigation.filters import filter_study as experiment
+    from strapgen.navigation.filters.filter_file import read
+    from strapgen.navigation.filters.filter_study import AnyFilter, FilterResult, OutputFilter
+
+    size = float(largest)
+    if file is None:
+        measured_filter: AnyFilter = OutputFilter(float(cutoff_hz), float(sample_hz))
+    else:
+        measured_filter = read(file)
+        size = float(measured_filter.range)
+    asked = experiment.usual_frequencies(measured_filter) if frequencies is None else frequencies
+    tones = experiment.check_frequencies(measured_filter, [*map(float, asked)])
     which = experiment.runs([*backend])
-    measured = track(experiment.measure(which, edge, size, tones), "measuring", len(which))
-    output.show(FilterResult.of(edge, size, tones, list(measured)))
+    measured = track(experiment.measure(which, measured_filter, size, tones), "measuring", len(which))
+    output.show(FilterResult.of(measured_filter, size, tones, list(measured)))
 
 
 @grouped
