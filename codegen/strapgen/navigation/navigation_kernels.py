@@ -216,6 +216,7 @@ LOOPS = {
     "heading-loop": _recipe("heading loop of second order", _LOOPS, "heading_loop"),
     "heading-from-dcm": _recipe("heading of an attitude", _LOOPS, "heading_of_attitude"),
     "vertical-loop": _recipe("vertical loop of third order", _LOOPS, "vertical_loop"),
+    "height-hysteresis": _recipe("hysteresis of the feedback of a height", _LOOPS, "height_hysteresis"),
     "tuned-rotor-loop": _recipe(
         "loop of a tuned-rotor gyro with rate observer", "instruments.tuned_rotor", "tuned_rotor_loop"
     ),
