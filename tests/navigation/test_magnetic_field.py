@@ -185,7 +185,8 @@ def test_more_degrees_than_code_may_have_are_refused(tmp_path):
     with pytest.raises(InputError, match=r"absent\.COF cannot be read"):
         read(tmp_path / "absent.COF")
     with pytest.raises(
-        InputError, match=r"magnetic-field needs a file: layout names it, in a command --layout or --field$"
+        InputError,
+        match=r"magnetic-field needs a file: layout names it, in a command --layout, --field or --filter$",
     ):
         choose("magnetic-field")
 
