@@ -276,9 +276,6 @@ def _with_init(source: ForeignSource, init: str, reader: SourceReader) -> Foreig
     if made and source.read.is_cpp:
         return replace(source, constructor=(made.name, said), init=init)
     signature = reader.signature("--init", name)
-    called = signature.name
-    if signature.owner:
-        called = f"{reading.variable(memories[0])}.{called.rpartition('::')[2]}"
     if not bracket:
         state = source.arguments.named(STATE)
         passed = []
@@ -294,7 +291,14 @@ def _with_init(source: ForeignSource, init: str, reader: SourceReader) -> Foreig
                     f'--init "{init}(...)" states its arguments'
                 )
         said = ", ".join(passed)
-    return replace(source, begins=f"{called}({said});", init=init)
+    return replace(source, begins=f"{_called(signature, source.arguments)}({said});", init=init)
+
+
+def _called(signature: Signature, arguments: ForeignArguments) -> str:
+    """Return what is called: a function, or a method of the first object in memory."""
+    if not signature.owner:
+        return signature.name
+    return f"{reading.variable(arguments.memories[0])}.{_last(signature.name)}"
 
 
 def _with_publications(source: ForeignSource, publishes: str, reader: SourceReader) -> ForeignSource:
@@ -397,10 +401,7 @@ def _call(source: ForeignSource, keeps: bool) -> str:
                 passed.append(argument.text)
             elif value.passed != "return":
                 passed.append(_passed(value))
-    name = signature.name
-    if signature.owner:
-        name = f"{reading.variable(source.arguments.memories[0])}.{name.rpartition('::')[2]}"
-    call = f"{name}({', '.join(passed)});"
+    call = f"{_called(signature, source.arguments)}({', '.join(passed)});"
     if keeps:
         return f"auto &&strapgen_returned = {call}" if source.read.is_cpp else f"strapgen_returned = {call}"
     if source.publishes != 1 and not source.counter and source.signature.returns is not None:
@@ -455,23 +456,21 @@ def _before(source: ForeignSource, values: Sequence[Value]) -> list[str]:
             f"memset({_variable(value)}.before, 0x5a, 64); memset({_variable(value)}.after, 0x5a, 64);"
         )
     if watched := _watched(arguments):
-        lines.append(
-            f"const double strapgen_kept[] = {{{', '.join(f'(double)({place})' for place in watched)}}};"
-        )
+        lines.append(f"const double strapgen_kept[] = {watched};")
     if source.counter:
         lines.append(f"const double strapgen_counted = (double)({source.counter});")
     return lines
 
 
-def _watched(arguments: ForeignArguments) -> list[str]:
-    """Return the numbers that a call must not change."""
-    unwatched = [*arguments.results, *(argument for argument in arguments.parameters if argument.type)]
-    return [
-        place
+def _watched(arguments: ForeignArguments) -> str:
+    """Return the list in C of the numbers that a call must not change; "" if there are none."""
+    places = [
+        f"(double)({place})"
         for argument in arguments.parameters
-        if argument not in unwatched and argument.name != CONSTANT
+        if not (argument in arguments.results or argument.type or argument.name == CONSTANT)
         for place in numbers_of(argument)
     ]
+    return f"{{{', '.join(places)}}}" if places else ""
 
 
 def _after(source: ForeignSource, values: Sequence[Value]) -> list[str]:
@@ -481,9 +480,7 @@ def _after(source: ForeignSource, values: Sequence[Value]) -> list[str]:
         name = _variable(value)
         lines.append(f"flags |= strapgen_touched({name}.before) | strapgen_touched({name}.after);")
     if watched := _watched(arguments):
-        lines.append(
-            f"const double strapgen_seen[] = {{{', '.join(f'(double)({place})' for place in watched)}}};"
-        )
+        lines.append(f"const double strapgen_seen[] = {watched};")
         lines.append("flags |= memcmp(strapgen_seen, strapgen_kept, sizeof strapgen_kept) != 0 ? 2 : 0;")
     if source.counter:
         lines.append(f"published = (double)({source.counter}) != strapgen_counted;")

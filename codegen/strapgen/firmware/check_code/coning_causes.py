@@ -267,6 +267,12 @@ def confidence(products: Products, said: str) -> tuple[float, str] | None:
     return max(0.0, 1.0 - best / left[other]) if left[other] else 0.0, other
 
 
+def sureness(products: Products, said: str) -> dict[str, float | str]:
+    """Return the confidence as a result has it; nothing where there is none."""
+    known = confidence(products, said)
+    return {"cause_confidence": known[0], "next_cause": known[1]} if known else {}
+
+
 def _scaled_rest(products: Products, base: Table, ideal: Table) -> float:
     """Return what the multiple of a correction leaves that fits best."""
     correction = _less(products.at_once, base)

@@ -177,7 +177,11 @@ def products(step: ForeignStep, runs: Sequence[SegmentRun], *, exact: bool) -> P
 def _odd(turns: Array) -> Array:
     """Return the part about x, y, z of rotations (N, axes, signs, 3) that belongs to the cross product."""
     weights = np.array([first * second for first, second in _SIGNS])
-    odd = (turns * weights[:, None]).mean(axis=2)
+    return about_axes((turns * weights[:, None]).mean(axis=2))
+
+
+def about_axes(odd: Array) -> Array:
+    """Return the part about x, y, z (N, 3) of what cross products with `AXES` (N, axes, 3) make."""
     parts = np.zeros((len(odd), 3))
     for number, (_, _, axis, sign) in enumerate(AXES):
         parts[:, axis] += sign * odd[:, number, axis] / 2

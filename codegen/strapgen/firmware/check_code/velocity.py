@@ -24,7 +24,16 @@ from strapgen.catalogue.methods.coning_coefficients import Design
 from strapgen.firmware.check_code import ladder
 from strapgen.firmware.check_code.foreign import ForeignStep, Segment, SegmentRun
 from strapgen.firmware.check_code.foreign_arguments import POSITION, VELOCITY
-from strapgen.firmware.check_code.probes import AXES, BEFORE, LATE, Products, Table, pairs, small_turn
+from strapgen.firmware.check_code.probes import (
+    AXES,
+    BEFORE,
+    LATE,
+    Products,
+    Table,
+    about_axes,
+    pairs,
+    small_turn,
+)
 from strapgen.lab.convergence import MOST_ERROR, Convergence, fitted
 from strapgen.lab.motions.motions import Motion, motion
 from strapgen.lab.motions.specific_forces import SpecificForce, force
@@ -282,12 +291,10 @@ class Velocity:
             ]
         ).reshape(len(known), len(AXES), 2, -1, 3)
         odd = (changes[:, :, 0] - changes[:, :, 1]) / (2 * small * self.push)
-        tables = []
-        for call in (-(-BEFORE // count) + 1, -1):
-            about = np.zeros((len(known), 3))
-            for number, (_, _, axis, sign) in enumerate(AXES):
-                about[:, axis] += sign * odd[:, number, call, axis] / 2
-            tables.append(dict(zip(known, about, strict=True)))
+        tables = [
+            dict(zip(known, about_axes(odd[:, :, call]), strict=True))
+            for call in (-(-BEFORE // count) + 1, -1)
+        ]
         sides: tuple[Table, Table] = ({}, {})
         for older, newer in pairs(count):
             even = 1.0 if older < 0 else 0.5  # of an earlier call, its attitude turns the push
@@ -320,9 +327,10 @@ class Velocity:
 
     def _third_order(self) -> float:
         angle = self._large
-        along = []
-        for run, segment in zip(self._runs["third"], self.segments["third"], strict=True):
-            along.append(self._velocity(run, _turned(segment.increments))[1, 1] / self.push)
+        along = [
+            self._velocity(run, _turned(segment.increments))[1, 1] / self.push
+            for run, segment in zip(self._runs["third"], self.segments["third"], strict=True)
+        ]
         return float(1 - np.mean(along)) / angle**2
 
     def _turns(self, coasts: Sequence[SegmentRun]) -> float:
