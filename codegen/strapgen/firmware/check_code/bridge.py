@@ -24,6 +24,7 @@ from strapgen.firmware.check_code.foreign_arguments import (
     ForeignArgument,
     ForeignArguments,
     is_foreign,
+    is_whole,
 )
 from strapgen.firmware.check_code.signature import (
     Signature,
@@ -440,11 +441,14 @@ def _before(source: ForeignSource, values: Sequence[Value]) -> list[str]:
     arguments, lines = source.arguments, []
     for argument in arguments.fed:
         lines += [f"{place} = *input++;" for place in numbers_of(argument)]
+    times = {name: f"strapgen_dt / {unit!r}" for name, unit in INTERVALS.items()} | {
+        STEP: "strapgen_step",
+        ZEROS: "0",
+    }
     for argument in arguments.parameters:
-        for place in numbers_of(argument) if argument.name in (*INTERVALS, STEP, ZEROS) else ():
-            unit, whole = INTERVALS.get(argument.name, 1.0), argument.carriers[0].number not in PRECISIONS
-            time = "strapgen_step" if argument.name == STEP else f"strapgen_dt / {unit!r}{' + 0.5' * whole}"
-            lines.append(f"{place} = {'0' if argument.name == ZEROS else time};")
+        for place in numbers_of(argument) if argument.name in times else ():
+            nearest = " + 0.5" if is_whole(argument) and argument.name != ZEROS else ""
+            lines.append(f"{place} = {times[argument.name]}{nearest};")
     for result in arguments.results:
         held = arguments.before(result)
         is_new = result.name in ARGUMENTS_OF_RESULTS and (held is None or held.name != result.name)

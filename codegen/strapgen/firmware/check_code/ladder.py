@@ -133,18 +133,9 @@ def order_on_ladder(step: ForeignStep, seen: Convergence) -> tuple[Finding, floa
     )
     if seen.observed is None:
         errors = [rung.error_rad for rung in seen.rungs if rung.error_rad is not None]
-        holds = False if min(errors) > MOST_ERROR else None
-        return Finding("order", holds, f"{seen.hidden}; {words}"), None
-    return (
-        Finding(
-            "order",
-            seen.observed > needed - ORDER_WITHIN,
-            f"observed {seen.observed:.3f}; {words}",
-            seen.observed,
-            needed - ORDER_WITHIN,
-        ),
-        seen.observed,
-    )
+        return Finding("order", False if min(errors) > MOST_ERROR else None, f"{seen.hidden}; {words}"), None
+    least, text = needed - ORDER_WITHIN, f"observed {seen.observed:.3f}; {words}"
+    return Finding("order", seen.observed > least, text, seen.observed, least), seen.observed
 
 
 def order_in_float(

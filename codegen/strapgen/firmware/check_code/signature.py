@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from strapgen.ir.checks import suggestions
+from strapgen.ir.checks import did_you_mean
 from strapgen.ir.exceptions import CompilerError, InputError, MissingExtraError
 from strapgen.run import compiler
 
@@ -137,8 +137,7 @@ class SourceReader:
         found = exact or found
         if not found:
             names = list(dict.fromkeys(full for full, cursor in self.functions if self._is_own(cursor)))
-            meant = suggestions("function", name, names)
-            guess = f" (did you mean {' or '.join(meant)}?)" if meant else ""
+            guess = did_you_mean("function", name, names)
             raise CompilerError(
                 f"{option}: {self.file.path} has no function {name}{guess}; it has {', '.join(names[:20]) or 'none'}"
             )
