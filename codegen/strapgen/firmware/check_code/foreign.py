@@ -123,8 +123,7 @@ class Convention:
         if states.shape[-1] == 9:
             matrices = _nearest(states.reshape(-1, 3, 3))
         elif states.shape[-1] == 3:
-            turns = evaluator("dcm-update")(np.broadcast_to(np.eye(3), (len(states), 3, 3)), states)
-            matrices = np.array(list(accumulate(turns, np.matmul)))
+            matrices = np.array(list(accumulate(rotations(states), np.matmul)))
         else:
             matrices = evaluator("dcm-from-euler")(self.ours(states / _or_one(lengths(states))[:, None]))
         return matrices if self.sense == SENSES[0] else np.swapaxes(matrices, -1, -2)
@@ -176,8 +175,7 @@ class SegmentRun:
         reference axes.
         """
         counts = np.arange(len(self.relative))[:, None]
-        back = evaluator("dcm-update")(np.broadcast_to(np.eye(3), (len(counts), 3, 3)), -counts * frame)
-        return replace(self, relative=self.start.T @ back @ self.start @ self.relative)
+        return replace(self, relative=self.start.T @ rotations(-counts * frame) @ self.start @ self.relative)
 
 
 @dataclass(frozen=True)
@@ -547,12 +545,18 @@ def _diagnostics(source: ForeignSource, lines: list[str]) -> str:
     return f"{source.file} does not compile: {error}"
 
 
+def rotations(vectors: Array) -> Array:
+    """Return the rotations (..., 3, 3) by rotation vectors (..., 3) in rad."""
+    turned: Array = evaluator("dcm-update")(np.broadcast_to(np.eye(3), (*vectors.shape[:-1], 3, 3)), vectors)
+    return turned
+
+
 def rotation_vectors(matrices: Array) -> Array:
     """Return the rotation vectors of rotations.
 
     `matrices` has shape (..., 3, 3). Returns (..., 3): in rad.
 
-    >>> rotation_vectors(evaluator("dcm-update")(np.eye(3), np.array([0.0, 0.0, 2.0]))).round(12) + 0.0
+    >>> rotation_vectors(rotations(np.array([0.0, 0.0, 2.0]))).round(12) + 0.0
     array([0., 0., 2.])
     """
     sines = drift_between(np.broadcast_to(np.eye(3), matrices.shape), matrices)

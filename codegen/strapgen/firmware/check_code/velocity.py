@@ -22,7 +22,7 @@ from strapgen import catalogue
 from strapgen.analysis.vibration import assessment
 from strapgen.catalogue.methods.coning_coefficients import Design
 from strapgen.firmware.check_code import ladder
-from strapgen.firmware.check_code.foreign import ForeignStep, Segment, SegmentRun
+from strapgen.firmware.check_code.foreign import ForeignStep, Segment, SegmentRun, rotations
 from strapgen.firmware.check_code.foreign_arguments import POSITION, VELOCITY
 from strapgen.firmware.check_code.probes import (
     AXES,
@@ -220,10 +220,7 @@ class Velocity:
         velocity = self._due_to_force(run, VELOCITY)
         if not self._frame.any():
             return velocity
-        counts = np.arange(len(velocity))[:, None]
-        back = evaluator("dcm-update")(
-            np.broadcast_to(np.eye(3), (len(velocity), 3, 3)), -counts * self._frame
-        )
+        back = rotations(-np.arange(len(velocity))[:, None] * self._frame)
         places = np.cumsum((velocity[1:] + velocity[:-1]) / 2, axis=0)
         velocity[1:] += (round(self.turns) - 1) * np.cross(-self._frame, places)
         turned: Array = np.einsum("nij,nj->ni", back, velocity)
@@ -425,9 +422,7 @@ def _turned(increments: Array) -> Array:
     for call in range(increments.shape[-3]):
         after = attitudes[-1]
         for sample in range(increments.shape[-2]):
-            after = after @ evaluator("dcm-update")(
-                np.broadcast_to(np.eye(3), after.shape), increments[..., call, sample, :]
-            )
+            after = after @ rotations(increments[..., call, sample, :])
         attitudes.append(after)
     return np.stack(attitudes, axis=-3)
 
