@@ -113,7 +113,8 @@ def derive(
         Values of inputs of a kernel that is no attitude algorithm, in their units and row by row, by name. These are
         then no inputs; what is multiplied by zero vanishes.
     layout : path or Description, optional
-        Of the kernels "separate" and "torques": the TOML file that describes the three gyros.
+        Of the kernels "separate" and "torques": the TOML file that describes the three gyros; of "magnetic-field": the
+        file of its coefficients; of "filter": the TOML file of its sections.
 
     Raises
     ------

@@ -381,10 +381,10 @@ class Instance:
 
         return fmi3LogMessageCallback(log)
 
-    def begin(self) -> None:
+    def begin(self, time: float = 0.0) -> None:
         if self.is_two:
-            self.fmu.setupExperiment(startTime=0.0)
-        self.fmu.enterInitializationMode()
+            self.fmu.setupExperiment(startTime=time)
+        self.fmu.enterInitializationMode(**({} if self.is_two else {"startTime": time}))
         self.fmu.exitInitializationMode()
 
     def _variables(self, name: str) -> tuple[list[int], str]:
@@ -478,6 +478,79 @@ def test_a_number_that_is_not_finite_is_an_error(instance, value):
     other = instance()
     other.put("initial_state", [0, 0, value, 1])
     assert refused(other, other.begin).startswith("initial_state")
+
+
+def test_a_jump_in_time_is_an_error(instance):
+    one = instance()
+    one.begin()
+    one.step(np.full((2, 3), 0.1), 0.0)
+    before = one.get("state")
+    for time in (0.0, 0.02, 0.01 * (1 + 1e-5), -0.01, np.nan, np.inf):
+        said = refused(one, lambda at=time: one.step(np.full((2, 3), 0.1), at))
+        assert "the step begins at" in said and "the time of the unit, 0.01" in said
+        assert one.get("state") == before
+    one.step(np.full((2, 3), 0.1), 0.01 * (1 - 1e-9))
+    kept = one.fmu.getFMUState()
+    one.step(np.full((2, 3), 0.1), 0.02)
+    one.fmu.setFMUState(kept)  # and the time with it
+    assert "the time of the unit, 0.0199" in refused(one, lambda: one.step(np.zeros((2, 3)), 0.03))
+    one.step(np.full((2, 3), 0.1), 0.02)
+    one.fmu.freeFMUState(kept)
+
+
+def test_sums_of_steps_may_be_rounded(instance):
+    one = instance()
+    one.begin()
+    time = 0.0
+    for place in range(1000):
+        one.step(np.zeros((2, 3)), time if place % 2 else place * 0.01)
+        time += 0.01
+
+
+def test_a_run_begins_at_the_time_that_it_is_told(instance):
+    one = instance()
+    one.begin(time=3.0)
+    assert "the time of the unit, 3 s" in refused(one, lambda: one.step(np.zeros((2, 3)), 0.0))
+    one.step(np.zeros((2, 3)), 3.0)
+    other = instance()
+    assert refused(other, lambda: other.begin(time=np.inf)) == "time is not finite"
+
+
+TURNED = np.array([[0, -1, 0], [1, 0, 0], [0, 0, 1]])
+
+
+@pytest.mark.parametrize(
+    ("unit", "good", "wrong"),
+    [
+        (
+            lambda: kernel("euler", "c"),
+            [0.5, -0.5, 0.501, 0.5],
+            {
+                (0, 0, 0, 0.9): "square of row 1 is 0.81; 1 is needed, within 0.01",
+                (0,) * 4: "is 0;",
+            },
+        ),
+        (
+            lambda: kernel("dcm", "c-fixed", GYRO),
+            TURNED * 2**30 + 1000,
+            {
+                tuple(TURNED.ravel() * 2**29): "square of row 1 is 0.25;",
+                (2**30, 0, 0, 2**30, 0, 0, 0, 0, 2**30): "rows 1 and 2 have product 1; 0 is needed",
+                tuple(-TURNED.ravel() * 2**30): "rows are left-handed",
+            },
+        ),
+    ],
+)
+def test_a_start_that_is_no_attitude_is_an_error(instance, unit, good, wrong):
+    for values, said in wrong.items():
+        one = instance(unit())
+        one.put("initial_state", [int(v) if v == int(v) and abs(v) > 1 else v for v in values])
+        message = refused(one, one.begin)
+        assert message.startswith("initial_state is no attitude: ") and said in message
+    one = instance(unit())
+    one.put("initial_state", good)
+    one.begin()
+    assert one.get("state") == pytest.approx(np.ravel(good).tolist())
 
 
 def test_what_the_code_refuses_is_an_error_and_changes_nothing(instance):

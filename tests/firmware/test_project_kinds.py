@@ -11,6 +11,7 @@ import tarfile
 import tomllib
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 import pytest
 from c_programs import needed
@@ -31,6 +32,15 @@ COMMANDS = {
 }
 BUILT = ["zephyr", "esp-idf", "platformio", "python"]
 KINDS = ["cmake", *BUILT, "arduino"]
+#: A file of each kind that describes the project.
+CHANGED = {
+    "cmake": "CMakeLists.txt",
+    "zephyr": "Kconfig",
+    "esp-idf": "idf_component.yml",
+    "platformio": "library.json",
+    "python": "pyproject.toml",
+    "arduino": "library.properties",
+}
 #: Every kind with a step and a whole; the other commands where they are quick.
 PAIRS = [
     *((kind, "step") for kind in BUILT),
@@ -134,15 +144,30 @@ def test_what_a_user_has_changed_stays(kind, project, capsys):
     command = f"{COMMANDS['float']} --project {kind} --out {folder}"
     assert says(command, capsys)[0] == 0
     assert says(f"{command} --check", capsys)[0] == 0
-    changed = next(
-        path for path in folder.rglob("*") if path.suffix in (".txt", ".yml", ".json", ".properties", ".toml")
-    )
+    stays(folder / CHANGED[kind], command, capsys)
+
+
+@pytest.mark.parametrize(
+    "name", ["late", *(pytest.param(name, marks=pytest.mark.long) for name in ("two-speed", "system"))]
+)
+def test_what_a_user_has_changed_stays_with_other_commands(name, project, capsys):
+    folder = project("zephyr", name)
+    stays(folder / "Kconfig", f"{COMMANDS[name]} --project zephyr --out {folder}", capsys)
+
+
+def stays(changed: Path, command: str, capsys: Any) -> None:
+    """Change a file of a project, which is then found, and written over when that is forced."""
     before = changed.read_text()
-    changed.write_text(before + "\n")
+    changed.write_text(before + "\n# mine\n")
     status, _, error = says(command, capsys)
     assert status == 2 and error.count("\n") == 1
-    assert f"{changed} exists and differs from what --project writes" in error
-    assert says(f"{command} --check", capsys)[0] == 1
+    assert f"{changed} exists and differs from what --project writes; --force writes over it" in error
+    status, out, error = says(f"{command} --check", capsys)
+    assert status == 1 and "-# mine" in out and str(changed) in out
+    assert error.endswith(
+        "out of step; the same command without --check writes the files again, with --force over those that you have "
+        "changed\n"
+    )
     assert says(f"{command} --force", capsys)[0] == 0 and changed.read_text() == before
 
 

@@ -17,7 +17,7 @@ from strapgen.fixedpoint import functions
 from strapgen.fixedpoint.derivation import quantities
 from strapgen.fixedpoint.derived_sums import samples
 from strapgen.fixedpoint.intervals import Interval
-from strapgen.fixedpoint.quantities import InputElement, Quantity, Sum
+from strapgen.fixedpoint.quantities import ExactOperation, InputElement, Quantity, Sum
 from strapgen.fixedpoint.ranges import Ranges, _Parts
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.program import Node, Program
@@ -97,6 +97,10 @@ def test_the_root_of_a_number_lies_between_its_ends():
         (node("maximum", "a", "b"), -1, 2),
         (node("maximum", "a", node("negate", "a")), 0, 1),
         (node("maximum", "a", node("subtract", 1, "a")), Fraction(1, 2), 2),
+        (node("maximum", "a", -3), -1, 1),
+        (node("maximum", -1, "a"), -1, 1),
+        (node("maximum", "a", node("add", "b", 3), -3), 1, 5),
+        (node("maximum", "a", 1), 1, 1),
         (node("select", node("at_least", "a", 0), "a", node("multiply", 3, "b")), -6, 6),
         (node("select", node("at_least", "a", 0), node("multiply", 3, "b"), "a"), -6, 6),
         (node("divide", "b", node("add", "a", 3)), -1, 1),
@@ -105,6 +109,33 @@ def test_the_root_of_a_number_lies_between_its_ends():
 )
 def test_a_range_is_attained(value, low, high):
     assert ends({"y": value}) == (low, high)
+
+
+def test_what_is_never_the_largest_is_left_out_and_at_its_end_it_stays():
+    product = node("multiply", "m", "b")
+    limits = {"a": 1, "b": 2}
+    known = derived(program({"m": node("maximum", "a", node("subtract", "b", 4)), "y": product}, limits))
+    assert known["m"].definition == Sum(((("a",), Fraction(1)),))
+    largest = node("maximum", -1, "a", node("subtract", "b", 4))
+    known = derived(program({"m": largest, "y": product}, limits))
+    assert known["m"].definition == ExactOperation("maximum", (Fraction(-1), "a"))
+
+
+def test_what_differs_from_a_function_by_a_number_is_made_from_its_value_and_inherits_its_error():
+    body = {"c": node("cos", "a"), "y": node("subtract", 8, "c"), "z": node("multiply", "y", "a")}
+    known = derived(program(body, {"a": 6}, "z"))
+    assert dict(known["y"].definition.terms) == {("c",): -1}
+    assert known["c"].inherited_error is not None
+
+
+@pytest.mark.parametrize("inputs", [(UNIT_VECTOR,), None])
+def test_an_angle_is_refused_off_a_constraint_alone(inputs):
+    """Inputs without a constraint are proper up to the ends of their ranges, of which samples know nothing."""
+    squares = [node("multiply", name, name) for name in "abcd"]
+    body = {"p": node("add", *squares[:2]), "q": node("add", Fraction(1, 8), node("add", *squares[2:]))}
+    code = program({**body, "y": node("atan2", "p", "q")}, dict.fromkeys("abcd", 1))
+    quantities = derived(replace(code, inputs=inputs or code.inputs))
+    assert any(quantity.range_checked for quantity in quantities.values()) == (inputs is not None)
 
 
 def test_a_divisor_below_zero_is_checked_to_stay_there():

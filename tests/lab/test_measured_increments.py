@@ -45,6 +45,7 @@ EVERY = InstrumentErrors(
         noise=np.full(3, 1e-4),
         random_walk=np.full(3, 1e-4),
         pulse=np.full(3, 1e-5),
+        lock_in=np.full(3, 1e-4),
         response=parse("gyro", "butterworth:3:20+decimation:2+fir:1/2:1/4:1/4"),
         delay=np.full(3, 0.013),
     ),

@@ -26,6 +26,7 @@ from strapgen.navigation.kalman.error_bound import run_bound
 from strapgen.navigation.kalman.kalman_file import KalmanFile, described
 from strapgen.navigation.kalman.kalman_filter import KalmanFilter, kalman
 from strapgen.run.backends import BACKENDS
+from strapgen.run.standard_tree import command_of
 
 EXAMPLE = Path("examples/kalman/gyrocompass.toml")
 #: A vehicle along a line with an accelerometer's bias, a position and a velocity; the velocity is scaled by an input.
@@ -294,7 +295,7 @@ def test_the_transition_is_exact_where_the_series_ends():
         },
     )
     assert model.transition == sp.Matrix([[1, "1/4", "-1/32"], [0, 1, "-1/4"], [0, 0, 1]])
-    assert model.model.is_nilpotent and model.model.left_out == 0
+    assert model.is_nilpotent and model.left_out == 0
     q = sp.Rational(1, 400)
     assert (
         model.Q[0, 1] == q * sp.Rational(1, 32) - 4 * sp.Rational(1, 10**6) * sp.Rational(1, 4) ** 4 / 8 * -1
@@ -407,7 +408,7 @@ def test_the_tables_of_a_schedule_hold_its_gains(tmp_path, capsys):
         assert len(rows) == len(gains) == 3600 and rows[-1][0] == "3600"
         for place in range(3):
             words = re.search(
-                r"(tilt_north|tilt_east|azimuth) in .*?(?:Q(\S+)\.(\d+), )?rounded by at most (\S+)",
+                r"(\w+) in .*?(?:Q(\S+)\.(\d+), )?rounded by at most (\S+)",
                 head.split("columns:")[1].splitlines()[1 + place],
             )
             unit = Fraction(2) ** -int(words[3]) if words[3] else 1
@@ -417,6 +418,7 @@ def test_the_tables_of_a_schedule_hold_its_gains(tmp_path, capsys):
             )
             assert 0 < worst <= Fraction(words[4]) < worst * Fraction(102, 100)
         assert all(rows[7][1 + place] in head for place in range(3))
+        assert command_of(head).startswith(f"strapgen kalman {EXAMPLE} --target {target}") or ending == "m"
 
 
 def test_the_command_says_what_the_object_has(capsys):

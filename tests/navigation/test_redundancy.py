@@ -14,9 +14,11 @@ import pytest
 import sympy as sp
 
 import strapgen
+from strapgen.catalogue import Choice
 from strapgen.cli import main
 from strapgen.ir.exceptions import InputError
 from strapgen.navigation.navigation_kernels import HEXAD_TRIADS, REDUNDANCY
+from strapgen.navigation.redundancy import redundancy_kernels
 from strapgen.navigation.redundancy.geometry import HEXAD, SensorGeometry, geometry
 from strapgen.navigation.redundancy.geometry_report import (
     GeometryResult,
@@ -181,13 +183,52 @@ def test_a_geometry_with_two_alike_axes_detects_their_failures_and_isolates_none
     assert (-1, 1, 0, 0, 0) in alike.equations
 
 
+def test_two_gyros_of_two_axes_check_the_axis_that_both_have(capsys):
+    """LTR-81: the second vertical axis is a test of the first, and no test of the horizontal ones."""
+    file = EXAMPLE.with_name("ltr81_gyros.toml")
+    data = json.loads(run(f"redundancy {file} --format json", capsys))
+    assert data["equations"] == [[0, 0, -1, 1]] and data["in_no_equation"] == [0, 1]
+    assert (data["fail_operate"], data["next_is_detected"]) == (0, False)
+    assert "in no equation, so that no failure is detected: 0, 1" in run(f"redundancy {file}", capsys)
+    (table,) = failure_tables(read(file).geometry)
+    assert {verdict.status: (verdict.failed, verdict.triad) for verdict in table.verdicts.values()} == {
+        "0": (None, 0),
+        "1": (None, 0),
+    }
+
+
+def test_a_failure_of_a_sensor_in_no_equation_changes_nothing_but_the_vector():
+    sensors = read(EXAMPLE.with_name("ltr81_gyros.toml"))
+    parity, select = (
+        strapgen.evaluator(Choice.of_user(kernel))
+        for kernel in (redundancy_kernels.parity(sensors), redundancy_kernels.select(sensors))
+    )
+    rates = np.array([[0.01, -0.02, 0.03, 0.03]] * 4) + np.eye(4) * 0.005
+    detected, failed, triad = select(parity(rates), np.full((4, 1), 0.004), np.zeros((4, 4)))
+    assert detected.tolist() == [0, 0, 1, 1] and not failed.any() and not triad.any()
+    # With one of the vertical axes taken out, nothing is left that could fail.
+    gone = np.array([[0, 0, 1, 0]] * 4)
+    detected, failed, triad = select(parity(rates), np.full((4, 1), 0.004), gone)
+    assert not detected.any() and triad.tolist() == [1] * 4
+
+
+@pytest.mark.parametrize("backend", ["numpy", "c"])
+def test_the_median_of_three_units_is_that_of_numpy_and_tells_who_is_off(backend, rng):
+    units = rng.uniform(-1, 1, (3, 200, 3))
+    trip = rng.uniform(0.2, 1.5, 200)
+    median, off = strapgen.evaluator("median-3", backend)(*units, trip)
+    expected = np.median(units, axis=0)
+    np.testing.assert_array_equal(median, expected)
+    np.testing.assert_array_equal(off.T, (np.abs(units - expected) >= trip[:, None]).any(axis=2))
+    assert 0 < off.mean() < 1
+
+
 def test_bad_geometries_are_refused_in_one_line_with_the_reason(tmp_path):
     file = tmp_path / "bad.toml"
     good = "[1, 0, 0], [0, 1, 0], [0, 0, 1]"
     for text, reason in (
         (f"axes = [{good}]", "axes has 3 entries; from 4 to 10 are needed"),
         ("axes = [[1, 0, 0], [0, 1, 0], [1, 1, 0], [1, 2, 0]]", "all axes lie in one plane"),
-        ("axes = [[1, 0, 0], [0, 1, 0], [1, 1, 0], [0, 0, 1]]", "axis 3 is in no parity equation"),
         (f"axes = [{good}, [0, 0, 0]]", "axis 3 is zero"),
         (f'axes = [{good}, [1, 2, "x"]]', "axes[4][3] is 'x': numbers, + - * /"),
         (f"axes = [{good}, [1e308, 0, 0]]", "axes[4][1] is 1e+308; a number from -1000 to 1000 is needed"),

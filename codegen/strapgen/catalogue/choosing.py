@@ -78,7 +78,8 @@ def choose(
         of its code. Of a user's kernel with unknowns, values of these. A float stands for its shortest decimal form.
         `derive` refuses what the kernel has no input for.
     layout : path or Description, optional
-        Of the kernels "separate" and "torques": the file that describes the gyros, or what was read from it.
+        Of the kernels "separate", "torques", "magnetic-field" and "filter": the file that describes the gyros, the
+        field or the filter, or what was read from it.
 
     Raises
     ------
@@ -153,10 +154,13 @@ def _with_values(kernel: Kernel, values: Constants) -> Kernel:
 
 def _with_layout(choice: Choice, layout: str | Path | Description | None) -> Choice:
     if choice.name not in LAYOUT_KERNELS:
-        raise InputError(f"{choice.name} takes no layout; {' and '.join(LAYOUT_KERNELS)} do")
+        raise InputError(f"{choice.name} takes no layout; these do: {', '.join(LAYOUT_KERNELS)}")
     if layout is None:
         others = ", ".join(name for name in KERNELS if name.startswith(f"{choice.name}-"))
-        raise InputError(f"{choice.name} needs the file of a layout; kernels of built-in ones are {others}")
+        built_in = f"; kernels of built-in ones are {others}" if others else ""
+        raise InputError(
+            f"{choice.name} needs a file: layout names it, in a command --layout, --field or --filter{built_in}"
+        )
     if isinstance(layout, str | os.PathLike):
         read: Callable[[str | os.PathLike[str]], Description] = registration.load(
             LAYOUT_KERNELS[choice.name].reader

@@ -283,8 +283,12 @@ class MethodOptions:
         Path | None,
         option(
             "--layout",
+            "--field",
+            "--filter",
             metavar="FILE",
-            help="TOML file with the layout of gyros for the kernels separate and measure.",
+            help="File of a kernel that is made from one: TOML with the layout of gyros for separate and torques, the "
+            "coefficients of a World Magnetic Model (.COF) for magnetic-field, the sections of filter; --field and "
+            "--filter are other names of it.",
         ),
     ] = None
 

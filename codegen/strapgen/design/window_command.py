@@ -365,9 +365,8 @@ def generate(
     sources = generated(window, algorithm, target, sample_hz, fixed, output.name)
     files = output.files(sources, "whole.project", sources)
     if output.check:
-        difference = output.compare(files)
-        typer.echo(difference, nl=False)
-        raise typer.Exit(1 if difference else 0)
+        output.show_difference(files, format)
+        return
     written = output.write(files)
     from strapgen.design.commit_late.commit_late_sources import LateResult
 

@@ -255,6 +255,12 @@ def _squared_names(context: DerivationContext, node: Node) -> list[str]:
 
 def _maximum(context: DerivationContext, name: str, node: Operation, meaning: str) -> None:
     arguments = tuple(operand_of(context, argument, f"{name}_argument") for argument in _flat(node))
+    highest = max(arguments, key=lambda argument: range_of(context, argument).lowest)
+    least = range_of(context, highest).lowest
+    arguments = tuple(a for a in arguments if a == highest or range_of(context, a).highest > least)
+    if arguments == (highest,) and isinstance(highest, str):  # the others are never above it
+        store(context, name, stored_terms(context, highest), meaning, whole=name in context.outputs)
+        return
     enclosure = maximum(range_of(context, argument) for argument in arguments)
     expansions: list[Terms | None] = [
         context.ranges.expanded.get(argument) if isinstance(argument, str) else {(): argument}
@@ -265,8 +271,8 @@ def _maximum(context: DerivationContext, name: str, node: Operation, meaning: st
         mean: Terms = {}
         for expansion in expansions:
             mean = combined(mean, expansion or {}, Fraction(1, len(arguments)))
-        least = context.ranges.enclosure([(m, c) for m, c in mean.items() if c], context.ranges.box)
-        enclosure = Interval(max(enclosure.low, least.low), enclosure.high)
+        middle = context.ranges.enclosure([(m, c) for m, c in mean.items() if c], context.ranges.box)
+        enclosure = Interval(max(enclosure.low, middle.low), enclosure.high)
 
     def largest(values: Samples) -> NDArray[np.float64]:
         rows = [np.broadcast_to(sampled(argument, values), len(values[""])) for argument in arguments]
@@ -348,7 +354,10 @@ def _distance_from_origin(context: DerivationContext, name: str, ordinate: str, 
                 square = stored_terms(context, radicand)
         terms = combined(terms, square, Fraction(1))
     distance = store_temporary(context, f"{name}_distance", terms)
-    _check_range(context, distance)
+    lengths = context.proper[distance]
+    # Without a constraint inputs are proper up to the ends of their ranges, where samples tell only what is constant.
+    if any(signal.constraint for signal in context.program.inputs) or np.ptp(lengths) <= np.min(lengths) / 64:
+        _check_range(context, distance)
     least = context.items[distance].range
     if least.low > 0:
         # Two vectors of length L or more, d apart, are up to 2 asin(d/2L) apart in angle. A value that is checked

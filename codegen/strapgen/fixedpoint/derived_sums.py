@@ -324,8 +324,12 @@ def _multiplied(context: DerivationContext, monomial: Monomial) -> Terms | None:
     quantity = context.items[monomial[0]]
     match quantity.definition:
         case Sum(((base, factor),)) if len(base) == 1:
-            exact = not (quantity.exact_addends or quantity.approximation_error or quantity.range_checked)
-            return {base: factor} if exact and quantity.name not in context.outputs else None
+            inexact = quantity.exact_addends or quantity.approximation_error or quantity.range_checked
+            if inexact or quantity.inherited_error or quantity.name in context.outputs:
+                return (
+                    None  # of a function's value not even the samples of what it is computed from are known
+                )
+            return {base: factor}
     return None
 
 

@@ -53,6 +53,7 @@ TWO_SPEED_LOOPS = {
 }
 
 _IMU, _PULSES, _SEPARATION = "instruments.imu_errors", "instruments.pulses", "instruments.separation"
+_OPTICAL = "instruments.optical_gyros"
 #: Kernels that correct the increments of sensors, and those that make their errors.
 COMPENSATION = {
     "imu-compensate": _recipe("compensation of a measurement unit", _IMU, "imu_compensate"),
@@ -70,6 +71,9 @@ COMPENSATION = {
     "temperature-coefficient": _recipe("coefficient by two slopes", _PULSES, "temperature_coefficient"),
     "scale-factor-heating": _recipe("scale factor by torquer heat", _PULSES, "scale_factor_heating"),
     "torquer-heating-errors": _recipe("errors by torquer heat", _PULSES, "scale_factor_heating", True),
+    "lock-in-errors": _recipe("increments of ring lasers that lock in", _OPTICAL, "lock_in_errors"),
+    "fibre-signal": _recipe("signals of fibre gyros without a loop", _OPTICAL, "fibre_signal"),
+    "fibre-rate": _recipe("rates of fibre gyros without a loop", _OPTICAL, "fibre_rate"),
     "separate-canonical": _recipe("rate and acceleration from torques", _SEPARATION, "separate", "canonical"),
     "separate-45": _recipe("separation, torquers at 45 degrees", _SEPARATION, "separate", "45"),
     "torques-canonical": _recipe("torques of mass-unbalanced gyros", _SEPARATION, "measure", "canonical"),
@@ -77,7 +81,7 @@ COMPENSATION = {
 }
 
 _READER = "strapgen.navigation.instruments.layout:read"
-#: Kernels of a layout that a file describes.
+#: Kernels of what a file describes: a layout of gyros, or a magnetic field.
 LAYOUTS = {
     "separate": _recipe(
         "rate and acceleration from torques, of a layout file",
@@ -87,6 +91,22 @@ LAYOUTS = {
     ),
     "torques": _recipe(
         "torques of mass-unbalanced gyros, of a layout file", "instruments.layouts", "measure", reader=_READER
+    ),
+    "magnetic-field": _recipe(
+        "magnetic field of the earth by spherical harmonics",
+        "frame.magnetic_field",
+        "magnetic_field",
+        reader="strapgen.navigation.frame.magnetic_file:read",
+    ),
+}
+
+#: The kernel of a filter that a file describes.
+FILTERS = {
+    "filter": _recipe(
+        "lag, lead-lag, notch, low pass or cascade, of a filter file",
+        "filters.filter_kernels",
+        "cascade",
+        reader="strapgen.navigation.filters.filter_file:read",
     ),
 }
 
@@ -139,13 +159,14 @@ REDUNDANCY = {
         f"triad-hexad-{name}": _recipe(f"vector of sensors {', '.join(name)}", _REDUNDANCY, "triad", number)
         for number, name in enumerate(HEXAD_TRIADS)
     },
+    "median-3": _recipe("median of three units", _REDUNDANCY, "median_of_three"),
     "moment-arm": _recipe("velocity increment at a moment arm", _REDUNDANCY, "moment_arm"),
     "boresight": _recipe("mean relative attitude of two units", _REDUNDANCY, "boresight"),
 }
 
 #: Kernels of what a navigator shows: filtered rates, magnetic heading, track angle, axes.
 OUTPUTS = {
-    "butterworth-2": _recipe("low-pass filter of second order", "outputs", "butterworth"),
+    "butterworth-2": _recipe("low-pass filter of second order", "filters.filter_kernels", "butterworth"),
     "variation": _recipe("magnetic variation between four points", "outputs", "variation"),
     "magnetic-heading": _recipe("heading by the magnetic variation", "outputs", "magnetic_heading"),
     "track-angle": _recipe("direction of the ground velocity", "outputs", "track_angle"),
@@ -160,6 +181,12 @@ OUTPUTS = {
         f"axes-{mounting}": _recipe(f"body axes of a unit that points {words}", "outputs", "axes", mounting)
         for mounting, words in MOUNTINGS.items()
     },
+}
+
+#: Kernels of the modes of a reference.
+MODES = {
+    "hysteresis": _recipe("switch with two thresholds", "modes", "hysteresis"),
+    "mode-sequence": _recipe("sequence of off, align, navigate, attitude", "modes", "mode_sequence"),
 }
 
 #: Kernels of an attitude held as two rows of its direction cosine matrix.
@@ -183,6 +210,9 @@ LOOPS = {
     "heading-loop": _recipe("heading loop of second order", _LOOPS, "heading_loop"),
     "heading-from-dcm": _recipe("heading of an attitude", _LOOPS, "heading_of_attitude"),
     "vertical-loop": _recipe("vertical loop of third order", _LOOPS, "vertical_loop"),
+    "tuned-rotor-loop": _recipe(
+        "loop of a tuned-rotor gyro with rate observer", "instruments.tuned_rotor", "tuned_rotor_loop"
+    ),
     "pulse-torque": _recipe("control law of a pulse torquing loop", _PULSES, "pulse_torque"),
     "body-feedback": _recipe("feedback of the loops in body axes", _LOOPS, "body_feedback"),
 }
@@ -193,9 +223,11 @@ KERNELS = {
     **TWO_SPEED_LOOPS,
     **COMPENSATION,
     **LAYOUTS,
+    **FILTERS,
     **NAVIGATION,
     **REDUNDANCY,
     **OUTPUTS,
+    **MODES,
     **TWO_ROWS,
     **LOOPS,
 }

@@ -5,8 +5,6 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING, Annotated
 
-import typer
-
 from strapgen.cli.fixed_options import FixedOptions
 from strapgen.cli.generate_command import SourceOptions
 from strapgen.cli.option_groups import Shown, grouped
@@ -76,9 +74,8 @@ def stamped_grid(
     sources = generated(sample_hz, tick_hz, stamp_bits, pairs, target, fixed, output.name)
     files = sources.step_files
     if output.check:
-        difference = output.compare(files)
-        typer.echo(difference, nl=False)
-        raise typer.Exit(1 if difference else 0)
+        output.show_difference(files, format)
+        return
     written = output.write(files)
     from strapgen.stamped.stamped_sources import StampedResult
 

@@ -24,6 +24,8 @@ UNITS = {
     "m/s": {"m": 1, "s": -1},
     "m/s^2": {"m": 1, "s": -2},
 }
+#: How far the squares of lengths may be from 1 where an attitude is needed.
+TOLERANCE = Fraction(1, 100)
 #: The type in C of a value by its name, and its format in fixed point.
 Types = Mapping[str, tuple[str, Argument | None]]
 
@@ -58,6 +60,14 @@ class Variable:
     #: Member of the struct in C, and place of an element in it
     member: str = ""
     place: int = 0
+    #: "unit" or "rotation" where a start must be one, and the value of 1 in memory
+    constraint: str = ""
+    scale: Fraction = Fraction(1)
+
+    @property
+    def tolerance(self) -> float:
+        """How far from 1 lengths of rows may be at the start; rounding to integers is within it."""
+        return float(TOLERANCE + (4 * self.scale if self.scale < 1 else 0))
 
     @property
     def size(self) -> int:
@@ -108,4 +118,7 @@ class Variables(list[Variable]):
             values = start or (Fraction(0),) * variable.size
             begin = tuple(float(v) if argument is None else argument.format.nearest(v) for v in values)
             variable = replace(variable, start=begin)
+            if start and signal.constraint in ("unit", "rotation"):
+                scale = Fraction(1) if argument is None else argument.unit
+                variable = replace(variable, constraint=signal.constraint, scale=scale)
         self.append(variable)

@@ -40,6 +40,7 @@ _DEG_H, _ARCSEC = math.radians(1 / 3600), math.radians(1 / 3600)
 _G = STANDARD_GRAVITY
 #: Factors of units of triads to SI units, where they are not 1.
 _SI = {
+    "deg/s": math.radians(1),
     "deg/h": _DEG_H,
     "deg/sqrt(h)": math.radians(1) / 60,
     "deg/h/sqrt(h)": _DEG_H / 60,
@@ -161,6 +162,12 @@ class GyroFile(TriadFile):
         Vector | None, _of("Random walk of the bias", "deg/h/sqrt(h)", "random_walk_deg_h_sqrt_h", 0)
     ] = None
     pulse: Annotated[Vector | None, _of("Angle of a pulse; 0 for none", "arcsec", "pulse_arcsec", 0)] = None
+    lock_in: Annotated[
+        Vector | None,
+        _of(
+            "Rate below which a ring laser without a dither is locked", "deg/s", "lock_in_deg_s", 0, _LARGEST
+        ),
+    ] = None
     B: Annotated[
         Term | None,
         _term("Drift by acceleration", "deg/h/g", "g_deg_h_g", "xx", "xy", "xz", "yx", "yy", "yz", "zx"),
@@ -178,6 +185,10 @@ class GyroFile(TriadFile):
         super().__post_init__()
         if self.noise is not None and self.dither is not None:
             raise InputError("noise_deg_sqrt_h and dither are both there; one of them is needed")
+        if self.lock_in is not None and self.dither is not None:
+            raise InputError(
+                "lock_in_deg_s and dither are both there; a dithered gyro has the noise of its lock-in"
+            )
 
     def changed(self, triad: TriadErrors, folder: Path) -> TriadErrors:
         """Return errors with those that are stated in their place."""

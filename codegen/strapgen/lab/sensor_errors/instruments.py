@@ -29,6 +29,7 @@ CAUSES: dict[str, tuple[str, ...]] = {
     "misalignment": ("misalignment",),
     "terms": ("terms",),
     "warm-up": ("warm_up",),
+    "lock-in": ("lock_in",),
     "heating": ("heating",),
     "noise": ("noise",),
     "random walk": ("random_walk",),
@@ -63,6 +64,8 @@ class TriadErrors(ReadOnly):
         Random walk of the bias in u/s/sqrt(s).
     pulse : array, (3,)
         Quantum of the angle (or velocity) in u; 0 for none.
+    lock_in : array, (3,)
+        Of gyros alone, rates in rad/s below which a ring laser gives nothing; see the kernel ``lock-in-errors``.
     response : Response, or three of them
         Response of the sensors about x, y and z; its delay adds to the others.
     delay : array, (3,)
@@ -85,6 +88,7 @@ class TriadErrors(ReadOnly):
     noise: Array = field(default_factory=zeros)
     random_walk: Array = field(default_factory=zeros)
     pulse: Array = field(default_factory=zeros)
+    lock_in: Array = field(default_factory=zeros)
     response: Response | tuple[Response, ...] = field(default_factory=Response)
     delay: Array = field(default_factory=zeros)
     bandwidth_hz: InitVar[Any] = None

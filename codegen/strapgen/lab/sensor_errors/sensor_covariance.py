@@ -28,7 +28,7 @@ Array = NDArray[np.float64]
 #: Most intervals of an integral along a motion.
 _MOST_INTERVALS = 50_000
 #: Causes whose effect is one and the same in every run, unless constants are drawn.
-STEADY = ("bandwidth", "delay", "bias", "scale", "misalignment", "terms", "warm-up", "heating")
+STEADY = ("bandwidth", "delay", "bias", "scale", "misalignment", "terms", "warm-up", "lock-in", "heating")
 #: Those of them whose numbers are constants, which a run can draw.
 DRAWN = ("bias", "scale", "misalignment", "terms")
 
@@ -270,6 +270,13 @@ def _of_constants(path: Path, errors: InstrumentErrors) -> Array:
         effect = _effect(path, replace(errors, gyro=one, accelerometer=TriadErrors()))
         total += _outer(effect, effect)
     return total
+
+
+def single_units(errors: InstrumentErrors) -> list[InstrumentErrors]:
+    """Return units that have each constant of both triads alone."""
+    nothing = replace(errors, gyro=TriadErrors(), accelerometer=TriadErrors(), drawn=False)
+    gyros = [replace(nothing, gyro=one) for one in single_constants(errors.gyro)]
+    return gyros + [replace(nothing, accelerometer=one) for one in single_constants(errors.accelerometer)]
 
 
 def single_constants(triad: TriadErrors) -> list[TriadErrors]:

@@ -1,7 +1,7 @@
 """`MeasurementUnit` turns true increments into those of sensors with errors, part by part from the start of a run on.
 
 The deterministic errors are kernels of the catalogue at the true values: ``imu-errors``, ``pulse-errors`` and
-``gyro-pulse-errors`` for scale factors by sign, and ``torquer-heating-errors``.
+``gyro-pulse-errors`` for scale factors by sign, ``lock-in-errors``, and ``torquer-heating-errors``.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ Array = NDArray[np.float64]
 #: Labels of the elements of a full matrix of coefficients.
 _PLACES = [f"{row}{column}" for row in "xyz" for column in "xyz"]
 #: Causes that leave the errors of an increment a function of this increment alone.
-_STEADY = ("bias", "scale", "misalignment", "terms")
+_STEADY = ("bias", "scale", "misalignment", "terms", "lock-in")
 #: Most pulses that can be counted, since a double represents every whole number up to here.
 _MOST_PULSES = 2.0**53
 
@@ -90,6 +90,8 @@ class MeasurementUnit:
         angle, velocity = self._by_kernels(angle, velocity)
         if "warm-up" in self._causes:
             angle = angle + self._warming(len(angle))
+        if "lock-in" in self._causes:
+            angle = evaluator("lock-in-errors")(angle, self._interval, self.errors.gyro.lock_in)
         if self._heating is not None:
             angle, velocity = self._heating(angle, velocity)
         if "scale" in self._causes:

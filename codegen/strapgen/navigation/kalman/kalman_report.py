@@ -134,13 +134,12 @@ class KalmanResult(Result):
         model: KalmanFilter, sources: Sequence[Sources], target: str, files: Sequence[Path]
     ) -> KalmanResult:
         """Return the result of a filter and its code."""
-        text, matrices = model.text, model.model
-        constant, solved = matrices.is_constant, model.solved
+        text, constant, solved = model.text, model.is_constant, model.solved
         interfaces = [one.fixed for one in sources if one.fixed is not None]
         bound = run_bound(model, interfaces) if interfaces else None
         formats = {one.signal.name: str(one.format) for one in interfaces[0].inputs} if interfaces else {}
         tables = {one.measurement: one for one in gain_tables.tables(model, sources[1:], target)}
-        left = matrices.left_out
+        left = model.left_out
         return KalmanResult(
             name=text.name,
             title=text.title,
@@ -168,7 +167,7 @@ class KalmanResult(Result):
             H=_entries(model.H),
             transition=_entries(model.transition) if constant else None,
             Q=_entries(model.Q) if constant else None,
-            order=matrices.order,
+            order=model.order,
             left_out=None if left is None else float_above(left),
             observability=model.observability,
             gains=[

@@ -120,12 +120,6 @@ class SensorGeometry:
                 raise InputError(f"axis {number} is zero; it measures nothing")
         if not self.triads:
             raise InputError("all axes lie in one plane; no triad of them measures a vector")
-        for number in range(len(self.axes)):
-            if not any(equation[number] for equation in self.equations):
-                raise InputError(
-                    f"axis {number} is in no parity equation, since the others lie in one plane; "
-                    "no failure of it would be detected"
-                )
 
     @property
     def count(self) -> int:
@@ -196,7 +190,11 @@ class SensorGeometry:
         return tuple(e for e in self.equations if not any(e[sensor] for sensor in removed))
 
     def undetected(self, removed: Sequence[int] = ()) -> tuple[int, ...]:
-        """Return the sensors in no equation once others are removed."""
+        """Return the sensors in no equation once others are removed: every vector needs them.
+
+        >>> geometry([[1, 0, 0], [0, 1, 0], [0, 0, 1], [0, 0, 1]]).undetected()
+        (0, 1)
+        """
         left = self.without(removed)
         return tuple(
             sensor

@@ -67,6 +67,8 @@ class GeometryResult(Result):
     fail_operate: int
     #: Whether one more is detected
     next_is_detected: bool
+    #: Sensors in no equation, whose failures are not detected
+    in_no_equation: Sequence[int]
     tables: Sequence[FailureTable]
     #: Files that were written
     files: Sequence[Path]
@@ -97,6 +99,7 @@ class GeometryResult(Result):
             least_squares=geometry.least_squares,
             fail_operate=geometry.fail_operate,
             next_is_detected=geometry.fail_safe,
+            in_no_equation=geometry.undetected(),
             tables=tables,
             files=files,
         )
@@ -166,7 +169,10 @@ def _failures(sensors: SensorSet) -> str:
         geometry.fail_operate, f"{geometry.fail_operate} failures are"
     )
     more = "is detected" if geometry.fail_safe else "may go undetected"
-    return f"{operate} isolated, whichever sensors fail; one more {more}"
+    text = f"{operate} isolated, whichever sensors fail; one more {more}"
+    if single := geometry.undetected():
+        text += f"\nin no equation, so that no failure is detected: {', '.join(map(str, single))}"
+    return text
 
 
 def tables_csv(sensors: SensorSet, tables: Sequence[FailureTable]) -> str:
@@ -237,7 +243,9 @@ def failure_table(geometry: SensorGeometry, removed: tuple[int, ...] = ()) -> Fa
     points = _scan(space)
     lengths = np.linalg.norm(vectors, axis=1)[:, None]
     fails = np.abs(vectors @ space.T @ points.T) >= lengths * (1 - _EQUAL)
-    alignment = np.abs(space.T @ points.T) / np.linalg.norm(space, axis=0)[:, None]
+    directions = np.linalg.norm(space, axis=0)[:, None]
+    # A sensor in no equation has no failure direction: nothing is aligned with it.
+    alignment = np.abs(space.T @ points.T) / np.where(directions > _EQUAL, directions, np.inf)
     alignment = alignment / np.linalg.norm(points, axis=1)
     statuses, place = _different(fails)
     verdicts = {}
@@ -269,10 +277,10 @@ def _scan(space: Array) -> Array:
     count = max(3, int(_POINTS ** (1 / size)) | 1)
     axis = np.linspace(-_REACH, _REACH, min(count, 4001))
     grid = np.stack(np.meshgrid(*[axis] * size, indexing="ij"), -1).reshape(-1, size)
-    grid = grid[np.any(grid != 0, axis=1)]
     along = (space * np.linspace(0.1, _REACH, 80)[:, None, None]).transpose(0, 2, 1).reshape(-1, size)
-    points: Array = np.concatenate([grid, along])
-    return points
+    points = np.concatenate([grid, along])
+    away: Array = points[np.linalg.norm(points, axis=1) > _EQUAL]
+    return away
 
 
 def _failed(alignment: Array, valid: list[int]) -> int | None:

@@ -17,9 +17,10 @@ from strapgen.catalogue.coefficients import Number, root
 from strapgen.catalogue.kinematics import DCM
 from strapgen.catalogue.toml_models import Key, UserFile
 from strapgen.ir import checks
-from strapgen.ir.signals import CYCLE, Signal
+from strapgen.ir.signals import ANY, CYCLE, Signal
 from strapgen.kernel.algebra import cross
 from strapgen.kernel.kernel import Kernel, KernelBuilder
+from strapgen.navigation.frame.frame_rates import FENNER
 from strapgen.navigation.redundancy.geometry import HEXAD, Axes, SensorGeometry, Triad, of_rows
 
 SEBRING = (
@@ -416,6 +417,36 @@ def boresight() -> Kernel:
         "boresight",
         "Mean relative attitude of two units",
         f"{SEBRING}, printed; running mean derived",
+    )
+
+
+def median_of_three() -> Kernel:
+    """Return the median of three units, element by element, and which of them are off it.
+
+    Returns: inputs ``unit_1`` to ``unit_3`` (3,) and ``trip``, in one unit; outputs ``median`` (3,), and ``off`` (3,),
+    1 for a unit of which an element is ``trip`` or more from the median, else 0.
+    """
+    build = KernelBuilder()
+    units = [
+        build.input(
+            Signal.vector(f"unit_{n}", f"u{n}", unit=ANY, meaning=f"vector of unit {n}, any axes", frame=ANY)
+        )
+        for n in (1, 2, 3)
+    ]
+    trip = build.scalar(Signal.scalar("trip", unit=ANY, meaning="distance from the median that is a failure"))
+    signal = Signal.vector("median", "median", unit=ANY, meaning="median of the units, any axes", frame=ANY)
+    # The larger of the smaller two: max(min(a, b), min(max(a, b), c)).
+    median = build.output(
+        signal, [sp.Max(-sp.Max(-a, -b), -sp.Max(-sp.Max(a, b), -c)) for a, b, c in zip(*units, strict=True)]
+    )
+    labels = [str(n) for n in (1, 2, 3)]
+    apart = [sp.Max(*(sp.Abs(x - m) for x, m in zip(unit, median, strict=True))) for unit in units]
+    build.output(_flags("off", "off", labels, "units off the median"), [_flag(a - trip) for a in apart])
+    return build.kernel(
+        "median-3",
+        "Median of three units",
+        f"{FENNER}: three units named, median derived",
+        notes=("Of angles that turn, the differences from one of the units.",),
     )
 
 
