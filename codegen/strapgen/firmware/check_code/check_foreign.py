@@ -45,6 +45,8 @@ _NORM_WITHIN = 1e-4
 _FRAME_WITHIN = 0.005
 #: Units in the last place that rounding adds in a call.
 _UNITS_A_CALL = 64
+#: Exceptions of Python at arrays of another shape than a function takes.
+_OF_SHAPES = ("it raises ValueError", "it raises IndexError", "it raises TypeError")
 #: Largest component in rad of random increments.
 _RANDOM = 0.02
 
@@ -233,13 +235,9 @@ class _Check:
     def calls(self, done: ForeignRun) -> Finding:
         """Return the finding on crashes of calls, and on writes outside of their memory."""
         if done.stopped:
-            raises = done.stopped.startswith("it raises") and not isinstance(self.step.source, ForeignSource)
-            also = (
-                "; if it takes arrays of other shapes, --arguments says so, as increments[2][3]"
-                if raises
-                else ""
-            )
-            return self.failed("calls", f"{done.stopped}{also}")
+            also = "; if it takes arrays of other shapes, --arguments says so, as increments[2][3]"
+            of_shapes = done.stopped.startswith(_OF_SHAPES)
+            return self.failed("calls", f"{done.stopped}{also * of_shapes}")
         if done.writes_beyond:
             return self.failed("calls", "it writes beyond the ends of its arrays")
         if done.changes_inputs:

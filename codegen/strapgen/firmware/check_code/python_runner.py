@@ -115,7 +115,7 @@ def _described(plan: dict[str, Any], module: Any, owner: Any, function: Any) -> 
         "returns": _returns(function),
         "owner": owner is not None,
         "fields": fields,
-        "variables": _sizes(module),
+        "variables": _sizes(module, levels=1),
     }
 
 
@@ -139,11 +139,12 @@ def _sizes(holder: Any, levels: int = 2) -> dict[str, int]:
             value = None if name.startswith("__") else getattr(holder, name)
         if value is None or callable(value) or inspect.ismodule(value):
             continue
-        try:
-            sizes[name] = np.asarray(value.as_quat() if hasattr(value, "as_quat") else value, np.float64).size
-        except (TypeError, ValueError):
-            inner = _sizes(value, levels - 1) if levels > 1 and hasattr(value, "__dict__") else {}
-            sizes |= {f"{name}.{each}": size for each, size in inner.items()}
+        value = value.as_quat() if hasattr(value, "as_quat") else value
+        if isinstance(value, int | float | list | tuple) or hasattr(value, "__array__"):
+            with suppress(TypeError, ValueError):  # of words
+                sizes[name] = np.asarray(value, np.float64).size
+        elif levels > 1 and hasattr(value, "__dict__"):
+            sizes |= {f"{name}.{each}": size for each, size in _sizes(value, levels - 1).items()}
     return sizes
 
 
