@@ -2,8 +2,9 @@
 
 Three lists of faults. The first is written down in tests/data/mutants.toml, and the tests have to notice all of it.
 The others are drawn at random: 40 from everything that computes, of which they have to notice 36, and 200 from the way
-from programs to text and to fixed point, of which they have to notice 180. A fault meets the test that noticed it last,
-the nearest tests that execute its line, the files of all that do, and then all tests; the first failure ends it.
+from programs to text and to fixed point, of which they have to notice 180. A fault of the last list meets the
+comparison of `generated/`; each meets the test that noticed it last, the nearest tests that execute its line, the files
+of all that do, and then all tests; the first failure ends it.
 Outcomes are kept in `.mutants/`, under a hash of the sources and tests, so that a run that was stopped goes on where it
 was. Drawn faults that no test can notice, or none does, stand with a reason in tests/data/unnoticed.toml. Exit status 1
 says that too many faults passed, or that the time did not do.
@@ -41,10 +42,15 @@ SEEDED = Path(__file__).parent / "data" / "mutants.toml"
 UNNOTICED = Path(__file__).parent / "data" / "unnoticed.toml"
 #: The seed of the draws.
 SEED = 1969
-#: Seconds and bytes of memory after which a session is stopped: such a fault is noticed too.
+#: Seconds and bytes of memory after which a session is stopped: such a fault is noticed too, unless all tests take so
+#: long.
 HANGS_S, MEMORY = 1800, 6 << 30
 #: Test functions of the first session of a fault.
 FIRST = 40
+#: The command of `make check` that compares `generated/` with what the sources give.
+COMPARISON = "strapgen generate --all --check"
+#: Seconds after which it is stopped; it takes six on an idle machine.
+COMPARISON_HANGS_S = 240
 #: Tests that compare the lists of faults with the sources: they fail under every fault, and are left out.
 ABOUT_FAULTS = "tests/test_mutants.py"
 #: What the cache has of compiled modules, each under a hash of all that goes into it: no fault changes its meaning.
@@ -184,17 +190,21 @@ class Runner:
         return self.folder / name
 
     def session(self, place: Path, *words: str) -> tuple[str, str]:
-        """Return "passed", "failed" or "stopped", and the test that failed, with a cache of its own but for modules."""
+        """Return "passed", "failed" or "stopped", and the test of a session of pytest that failed."""
+        return self.run(place, command(words), HANGS_S)
+
+    def run(self, place: Path, command: Sequence[str], hangs_s: float) -> tuple[str, str]:
+        """Run a command in a copy with a cache of its own but for compiled modules."""
         import resource  # of POSIX systems alone
 
-        limit = min(self.end - time.monotonic(), HANGS_S)
+        limit = min(self.end - time.monotonic(), hangs_s)
         with tempfile.TemporaryDirectory(prefix="cache-", dir=self.folder) as folder:
             for kind in _COMPILED:
                 (self.state.parent / kind).mkdir(parents=True, exist_ok=True)
                 (Path(folder) / kind).symlink_to(self.state.parent / kind)
             paths = {"PYTHONPATH": f"{place}/codegen:{place}/tests", "STRAPGEN_CACHE_DIR": folder}
             process = subprocess.Popen(
-                command(words),
+                command,
                 cwd=place,
                 env=os.environ | paths | {"COVERAGE_FILE": str(self.state / "coverage")},
                 stdout=subprocess.PIPE,
@@ -207,7 +217,7 @@ class Runner:
             try:
                 said, _ = process.communicate(timeout=max(limit, 0))
             except subprocess.TimeoutExpired:
-                return ("stopped", "") if time.monotonic() > self.end else ("failed", f"{HANGS_S} s")
+                return ("stopped", "") if time.monotonic() > self.end else ("failed", f"{hangs_s} s")
             finally:
                 with contextlib.suppress(ProcessLookupError):
                     os.killpg(process.pid, signal.SIGKILL)
@@ -218,6 +228,10 @@ class Runner:
 
     def outcome(self, place: Path, fault: Fault, executed: CoverageData, before: str) -> tuple[str, str]:
         """Return "caught", "survived" or "open" for a fault that a copy has, and the test that noticed it."""
+        if fault.part == "lowering":
+            result, _ = self.run(place, [sys.executable, "-m", *COMPARISON.split()], COMPARISON_HANGS_S)
+            if result != "passed":
+                return ("open", "") if result == "stopped" else ("caught", COMPARISON)
         tests = [test for test in executing(executed, fault.site.file, fault.line) if test != before]
         sessions = [
             [before] if (place / before.partition("::")[0]).is_file() else [],
@@ -226,8 +240,10 @@ class Runner:
         ]
         for words in [*filter(None, sessions), self.paths]:
             result, by = self.session(place, "-x", *words)
+            if result == "stopped" or (words is self.paths and by == f"{HANGS_S} s"):
+                return "open", ""
             if result != "passed":
-                return ("open", "") if result == "stopped" else ("caught", by)
+                return "caught", by
         return "survived", ""
 
 

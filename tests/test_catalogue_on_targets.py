@@ -11,6 +11,7 @@ import math
 import re
 from collections.abc import Iterator
 from fractions import Fraction
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -26,6 +27,7 @@ from strapgen.ir.kernel_info import Recursion
 from strapgen.navigation.navigation_kernels import (
     COMPENSATION,
     LOOPS,
+    MODES,
     MOUNTINGS,
     NAVIGATION,
     OUTPUTS,
@@ -47,10 +49,15 @@ TRANSLATIONS = ("dcm-translation", "euler-translation")
 NAMED = [
     Choice(name)
     for name in dict.fromkeys(
-        [*NAVIGATION, *REDUNDANCY, *LOOPS, *COMPENSATION, *OUTPUTS, *TWO_ROWS, *TRANSLATIONS]
+        [*NAVIGATION, *REDUNDANCY, *LOOPS, *COMPENSATION, *OUTPUTS, *MODES, *TWO_ROWS, *TRANSLATIONS]
     )
 ]
-MORE = [*NAMED, *VECTORS]
+#: Filters of every kind of section, which bring their ranges.
+FILTERS = [
+    choose("filter", layout=path)
+    for path in sorted((Path(__file__).resolve().parents[1] / "examples" / "filters").iterdir())
+]
+MORE = [*NAMED, *VECTORS, *FILTERS]
 EVERY = [*FIXED_POINT, *(choice for choice in MORE if choice not in FIXED_POINT)]
 #: What is compiled in the quick tests: sums, roots, functions, quotients, recursions with error feedback, steps.
 COMPILED = (
@@ -76,6 +83,7 @@ COMPILED = (
 RANGES = {
     "butterworth-2": {"sample": Fraction(128), "first": Fraction(128), "second": Fraction(192)},
     **{f"axes-{mounting}": {"sensed": Fraction(128)} for mounting in MOUNTINGS},
+    "hysteresis": dict.fromkeys(("value", "lower", "upper"), Fraction(128)),
     "median-3": {name: Fraction(128) for name in ("unit_1", "unit_2", "unit_3", "trip")},
     "velocity-position": {"velocity_increments": Fraction(1, 2)},
     **{name: {"cycle": Fraction(1, 50)} for name in TRANSLATIONS},
@@ -129,9 +137,11 @@ def share_of_range(kernel: str, signal: str, states: list[str]) -> Fraction:
     """Return how much of the range of an input is proper."""
     if kernel in LOOPS and signal in ("k1", "k2", "k3"):  # gains are for small errors
         return Fraction(1, 1 << 14)
+    if kernel == "tuned-rotor-loop" and signal not in ("turn", "share"):  # small angles, whatever the turn
+        return Fraction(1, 16)
     if kernel in LOOPS and (signal in states or signal.startswith(("reference", "magnetic"))):
         return Fraction(1, 4)  # no corner has two headings half a turn apart, where the error jumps
-    if signal in ("sample", "first", "second", "sensed"):
+    if signal.startswith(("sample", "first", "second", "sensed")):
         return Fraction(1, 4)
     if kernel == "flight-path-angle":  # slow, where the error is largest
         return Fraction(1, 256)

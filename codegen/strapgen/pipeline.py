@@ -114,7 +114,7 @@ def derive(
         then no inputs; what is multiplied by zero vanishes.
     layout : path or Description, optional
         Of the kernels "separate" and "torques": the TOML file that describes the three gyros; of "magnetic-field": the
-        file of its coefficients.
+        file of its coefficients; of "filter": the TOML file of its sections.
 
     Raises
     ------

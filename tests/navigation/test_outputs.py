@@ -1,15 +1,13 @@
-"""What a navigator puts on its bus: the kernels, the filter on back ends, words, and the accuracy of flights."""
+"""What a navigator puts on its bus: the kernels, words, and the accuracy of flights."""
 
 from __future__ import annotations
 
-import json
 import math
 from fractions import Fraction
 
 import numpy as np
 import pytest
 import sympy as sp
-from commands import run
 from derived import kernel
 from hypothesis import given
 from hypothesis import strategies as st
@@ -17,37 +15,8 @@ from hypothesis import strategies as st
 import strapgen
 from strapgen.catalogue import Choice
 from strapgen.ir.exceptions import InputError
-from strapgen.navigation import output_filter as experiment
 from strapgen.navigation.navigation_kernels import MOUNTINGS
-from strapgen.navigation.output_filter import OutputFilter, decibels
 from strapgen.navigation.outputs import OUTPUT_WORDS, PRINTED, RAYLEIGH, VariationTable, radial_error_rate
-
-
-@pytest.mark.long
-def test_the_filter_is_the_bilinear_transform_and_no_cycle_lengthens_its_state():
-    K, k, z, x, s1, s2 = sp.symbols("K k z x s1 s2", positive=True)
-    n = 1 + k * K + K**2  # k = sqrt(2) in what follows; the identities hold for any
-    states = {f"{name}_{axis}": value for name, value in (("first", s1), ("second", s2)) for axis in "xyz"}
-    sample = {f"x_{axis}": x for axis in "xyz"}
-    coefficients = {"loss": 1 - 1 / n, "coupling": K / n, "square": K**2 / n}
-    values = kernel(Choice("butterworth-2")).expand({**states, **sample, **coefficients})
-    first, second, filtered = (values[name][0] for name in ("next_first", "next_second", "filtered"))
-    M, N = sp.Matrix([first, second]).jacobian([s1, s2]), sp.Matrix([first, second]).diff(x)
-    D = (z * sp.eye(2) - M).applyfunc(sp.cancel)
-    state = D.adjugate() * N / D.det()
-    H = filtered.diff(s1) * state[0] + filtered.diff(s2) * state[1] + filtered.diff(x)
-    s = (z - 1) / (z + 1) / K
-    assert sp.cancel(H - 1 / (s**2 + k * s + 1)) == 0
-    b, a1, a2 = K**2 / n, 2 * (K**2 - 1) / n, (1 - k * K + K**2) / n
-    assert sp.cancel(H - b * (1 + 1 / z) ** 2 / (1 + a1 / z + a2 / z**2)) == 0
-    # What a cycle takes from the square of the state's length is a square: lengths never grow, at any edge.
-    lost = s1**2 + s2**2 - (first**2 + second**2).subs(x, 0)
-    assert sp.cancel(lost - k * K * (2 * (s1 - K * s2) / n) ** 2) == 0
-    # A constant passes unchanged with any coefficients, since they multiply zeros alone.
-    symbols = {name: sp.Symbol(name) for name in coefficients}
-    rest = {f"first_{axis}": 0 for axis in "xyz"} | {f"second_{axis}": x for axis in "xyz"}
-    values = kernel(Choice("butterworth-2")).expand({**rest, **sample, **symbols})
-    assert [values[name] for name in ("filtered", "next_first", "next_second")] == [[x] * 3, [0] * 3, [x] * 3]
 
 
 def test_variation_is_exact_at_corners_and_linear_on_edges():
@@ -147,103 +116,6 @@ def test_two_rows_agree_with_three():
     D = C[:2, :]
     expected = D + (sp.eye(2) - D * D.T) * D / 2  # equation (32) for two rows
     assert (sp.Matrix([two["next_row_1"], two["next_row_2"]]) - expected).expand() == sp.zeros(2, 3)
-
-
-EDGE = OutputFilter(3.2, 50)
-
-
-def test_responses_are_those_of_the_source():
-    assert [round(b, 10) for b in EDGE.numerator[:1]] == [0.0312389237]
-    assert [round(a, 10) for a in EDGE.denominator[1:]] == [-1.4415303099, 0.5664860047]
-    wide = OutputFilter(8, 50)
-    responses = (EDGE.analog(10), EDGE.digital(10), wide.analog(10), wide.digital(10))
-    assert [round(decibels(r), 5) for r in responses] == [-19.8393, -22.10774, -5.36736, -6.07507]
-    assert round(decibels(EDGE.analog(10))) == -20  # printed
-    assert [round(1e3 * t, 4) for t in (EDGE.analog_delay_s, EDGE.digital_delay_s)] == [70.3372, 69.3868]
-    for edge in (EDGE, wide):
-        assert math.isclose(abs(edge.digital(edge.cutoff_hz)), math.sqrt(0.5), rel_tol=1e-14)
-        slow = 1e-5  # phase over angular frequency at a frequency that is all but zero
-        for response, delay in ((edge.analog, edge.analog_delay_s), (edge.digital, edge.digital_delay_s)):
-            assert math.isclose(-np.angle(response(slow)) / (2 * math.pi * slow), delay, rel_tol=1e-6)
-
-
-def test_no_state_leaves_its_range_and_some_input_takes_it_there():
-    values = experiment.filter_evaluator(EDGE, 1.0, "numpy")
-    first, response = np.zeros((2, EDGE.settling)), np.zeros(2)
-    state = np.array([2 * EDGE.coefficients["coupling"], 2 * EDGE.coefficients["square"]])
-    for k in range(EDGE.settling):
-        first[:, k] = state
-        state = EDGE.transition @ state
-    for number, limit in enumerate(EDGE.state_ranges):
-        states = [np.zeros(3), np.zeros(3)]
-        for sign in np.sign(first[number, ::-1]):
-            *states, response = values(*states, np.full(3, sign))
-        assert math.isclose(abs(states[number][0]), limit, rel_tol=1e-12)
-    assert np.isfinite(response).all()
-
-
-@pytest.mark.long
-def test_sines_measure_the_response_and_no_run_leaves_its_bound(rng):
-    lines = (0.32, 3.2, 10.0)
-    which = experiment.runs(["numpy", "c-float", "c-fixed32", "c-fixed16"])
-    assert len(which) == 6
-    for edge in (EDGE, OutputFilter(0.05, 50)):
-        for measured in experiment.measure(which, edge, 128.0, lines):
-            # Four roundings in a cycle of numbers up to 1, or the bound over the size of the sine.
-            epsilon = np.finfo(np.float32 if measured.backend == "c-float" else float).eps
-            rounding = 4 * epsilon * edge.accumulated((1.0, 1.0)).max()
-            precision = measured.bound / 96 if measured.bound else rounding
-            for line, response in zip(lines, measured.responses, strict=True):
-                assert abs(response - edge.digital(line)) <= 2 * precision, (measured.backend, line)
-            # A sample is rounded by half a unit beside the bound.
-            slack = 0.0 if measured.unit is None else measured.unit / 2
-            limit = measured.bound or 128 * precision
-            assert measured.constant <= limit + slack
-            assert measured.rest <= limit
-        for word in (16, 32):
-            reference = experiment.filter_evaluator(edge, 128.0, "numpy")
-            for carry in ("none", "all"):
-                fixed = experiment.filter_evaluator(edge, 128.0, f"c-fixed{word}", carry)
-                samples = rng.uniform(-128, 128, size=(3000, 2, 3))
-                argument = fixed.interface.inputs[-1]
-                samples = fixed.numbers(argument, fixed.integers(argument, samples.reshape(-1, 3)))
-                samples = samples.reshape(3000, 2, 3)
-                error = experiment.run_filter(fixed, samples) - experiment.run_filter(reference, samples)
-                bound = experiment.certified_bound(fixed, edge)
-                assert np.abs(error).max() <= bound + 1e-10
-                # Errors are random and the bound is of the worst; with feedback they do not add up at all.
-                assert np.abs(error).max() > bound / (50 if edge is EDGE else 3000)
-
-
-@pytest.mark.long
-def test_error_feedback_keeps_a_slow_filter_from_standing_still():
-    slow = OutputFilter(0.05, 50)  # tau is 3 s; without feedback small steps of the state are lost
-    plain, fed = experiment.measure([("c-fixed16", "none"), ("c-fixed16", "all")], slow, 128.0, (1.0,))
-    assert fed.constant <= 3 * fed.unit
-    assert plain.constant > 10 * fed.constant
-    assert fed.rest <= 3 * fed.unit
-
-
-def test_study_has_every_format_and_refuses_invalid_input(tmp_path, capsys):
-    image = tmp_path / "filter.png"
-    run(["study", "output-filter", "--backend", "numpy", "--format", "json", "--plot", str(image)])
-    answer = json.loads(capsys.readouterr().out)
-    assert image.stat().st_size > 10_000
-    assert answer["responses"][4]["hz"] == 10
-    assert round(answer["responses"][4]["digital_db"], 5) == -22.10774
-    assert round(answer["measured"][0]["gains_db"][4], 5) == -22.10774
-    for words, reason in (
-        (
-            "--cutoff-hz 25",
-            "cutoff-hz is 25; at 50 samples in a second a filter has an edge from 0.0005 to below 25",
-        ),
-        ("--frequency-hz 30", "frequency 30 Hz is not above 0 and below 25, half of sample-hz"),
-        ("--cutoff-hz 0.001", "cycles to measure; at most"),
-    ):
-        run(["study", "output-filter", *words.split()], 2)
-        said = capsys.readouterr().err
-        assert said.count("\n") == 1
-        assert reason in said
 
 
 def test_radial_error_rate_bounds_95_of_100_flights(rng):

@@ -10,7 +10,7 @@ import sympy as sp
 from strapgen import derive
 from strapgen.ir.exceptions import InputError
 from strapgen.kernel.kernel import evaluate_stages
-from strapgen.navigation.torquing import TorqueLoop, torquing_rows
+from strapgen.navigation.torquing import TorqueLoop, modulation_rows, torquing_rows
 
 #: Linear and quantised figures of the set that fits, to the digits of the derivation.
 EXPECTED = {
@@ -104,3 +104,27 @@ def test_a_constant_that_cannot_be_is_refused():
     with pytest.raises(InputError, match="the loop is unstable: a pole of its linear form has the magnitude"):
         TorqueLoop(delay_cycles=20).require_stable()
     assert math.isclose(TorqueLoop().pulse_arcsec, 2.8125)
+
+
+def test_binary_torquing_has_one_power_and_one_bias_and_ternary_a_scale_factor_by_sign():
+    """Printed: constant power and an equivalent bias by the asymmetry, or a power that depends on the rate."""
+    loop = replace(TorqueLoop(), asymmetry_ppm=200.0)
+    rows = {(row.modulation, row.rate_deg_s): row for row in modulation_rows(loop)}
+    assert len(rows) == 6
+    for row in rows.values():
+        assert row.run_drift_deg_h == pytest.approx(row.drift_deg_h, rel=1e-6, abs=1e-6)
+    for rate in (0.0, 75.0, -75.0):
+        binary, ternary = rows["binary", rate], rows["ternary", rate]
+        assert binary.power == 1
+        assert binary.drift_deg_h == pytest.approx(-150 * 3600 * 1e-4)  # half of 200 ppm of the largest rate
+        assert ternary.power == pytest.approx(abs(rate) / 150, rel=1e-3)
+        assert ternary.drift_deg_h == pytest.approx(-abs(rate) * 3600 * 1e-4, rel=1e-3)
+
+
+def test_without_an_asymmetry_the_modulations_measure_alike():
+    loop = replace(TorqueLoop(), asymmetry_ppm=1e-9)
+    (none, _), *others = [
+        loop.run(lambda t: 30 + 0 * t, 400, 0.0, True, name) for name in ("", "ternary", "binary")
+    ]
+    for angle, _ in others:
+        np.testing.assert_allclose(angle, none, atol=1e-6)

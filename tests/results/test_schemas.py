@@ -64,6 +64,7 @@ COMMANDS = {
     "redundancy examples/hexad.toml --out OUT": "redundant-sensors",
     "study redundancy --trials 10": "redundancy",
     "study calibration examples/positions-20.toml --rate-deg-s 10,0,0": "calibration",
+    "study calibration examples/turning.toml --errors ins-1 --runs 10": "calibration",
     "study attitude-form --update-hz 100 --max-rate-deg-s 200": "attitude-form",
     "study output-filter --cutoff-hz 8 --sample-hz 100 --backend numpy,c-fixed16": "output-filter",
     "study pulse-torque": "pulse-torque",

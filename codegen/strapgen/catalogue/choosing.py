@@ -78,8 +78,8 @@ def choose(
         of its code. Of a user's kernel with unknowns, values of these. A float stands for its shortest decimal form.
         `derive` refuses what the kernel has no input for.
     layout : path or Description, optional
-        Of the kernels "separate", "torques" and "magnetic-field": the file that describes the gyros or the field, or
-        what was read from it.
+        Of the kernels "separate", "torques", "magnetic-field" and "filter": the file that describes the gyros, the
+        field or the filter, or what was read from it.
 
     Raises
     ------
@@ -159,7 +159,7 @@ def _with_layout(choice: Choice, layout: str | Path | Description | None) -> Cho
         others = ", ".join(name for name in KERNELS if name.startswith(f"{choice.name}-"))
         built_in = f"; kernels of built-in ones are {others}" if others else ""
         raise InputError(
-            f"{choice.name} needs a file: layout names it, in a command --layout or --field{built_in}"
+            f"{choice.name} needs a file: layout names it, in a command --layout, --field or --filter{built_in}"
         )
     if isinstance(layout, str | os.PathLike):
         read: Callable[[str | os.PathLike[str]], Description] = registration.load(

@@ -443,6 +443,23 @@ def parse(hint: Any, value: Any, where: str = "") -> Any:
     return _form(hint)[0].read(where, value)
 
 
+def check_kind(table: Any, what: str, kinds: Mapping[str, tuple[Collection[str], Collection[str]]]) -> None:
+    """Refuse a table without a key that its `kind` needs, or with one that its kind does not have.
+
+    `kinds` holds the keys that each needs and those that it may have; a key is there unless it is None or empty.
+    """
+    needed, further = kinds[table.kind]
+    values = {field.name: getattr(table, field.name) for field in dataclasses.fields(table)}
+    stated = [name for name, value in values.items() if name != "kind" and value not in (None, ())]
+    for name in needed:
+        if name not in stated:
+            raise InputError(f"{what} of kind {table.kind} needs {name}")
+    for name in stated:
+        if name not in (*needed, *further):
+            takes = ", ".join((*needed, *further)) or "no other key"
+            raise InputError(f"{what} of kind {table.kind} has no {name}; it takes {takes}")
+
+
 def keys(model: Any) -> dict[str, Key]:
     """Return the keys of a model by its fields."""
     return {field.name: key for field, _, key in _table(model).keys.values()}

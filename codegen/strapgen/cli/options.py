@@ -284,9 +284,11 @@ class MethodOptions:
         option(
             "--layout",
             "--field",
+            "--filter",
             metavar="FILE",
             help="File of a kernel that is made from one: TOML with the layout of gyros for separate and torques, the "
-            "coefficients of a World Magnetic Model (.COF) for magnetic-field, which --field names too.",
+            "coefficients of a World Magnetic Model (.COF) for magnetic-field, the sections of filter; --field and "
+            "--filter are other names of it.",
         ),
     ] = None
 

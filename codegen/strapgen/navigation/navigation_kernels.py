@@ -30,6 +30,12 @@ SAMPLING = {
     "velocity-counts": _recipe(
         "velocity increments from counts", "systems.sampling", "scaled_counts", "velocity"
     ),
+    "interpolated-integral": _recipe(
+        "integral from a sample to a time, by a polynomial", "preintegration.interpolation", "integral"
+    ),
+    "interpolated-mean": _recipe(
+        "mean over an interval from samples, by a polynomial", "preintegration.interpolation", "mean"
+    ),
 }
 
 _TWO_SPEED = "two_speed.two_speed_loops"
@@ -100,6 +106,16 @@ LAYOUTS = {
     ),
 }
 
+#: The kernel of a filter that a file describes.
+FILTERS = {
+    "filter": _recipe(
+        "lag, lead-lag, notch, low pass or cascade, of a filter file",
+        "filters.filter_kernels",
+        "cascade",
+        reader="strapgen.navigation.filters.filter_file:read",
+    ),
+}
+
 _RATES, _STEPS, _GEOGRAPHIC = "frame.frame_rates", "frame.navigation_steps", "frame.geographic"
 #: Kernels of the navigation frame: its rate, gravity, velocity and position, and its alignment.
 NAVIGATION = {
@@ -156,7 +172,7 @@ REDUNDANCY = {
 
 #: Kernels of what a navigator shows: filtered rates, magnetic heading, track angle, axes.
 OUTPUTS = {
-    "butterworth-2": _recipe("low-pass filter of second order", "outputs", "butterworth"),
+    "butterworth-2": _recipe("low-pass filter of second order", "filters.filter_kernels", "butterworth"),
     "variation": _recipe("magnetic variation between four points", "outputs", "variation"),
     "magnetic-heading": _recipe("heading by the magnetic variation", "outputs", "magnetic_heading"),
     "track-angle": _recipe("direction of the ground velocity", "outputs", "track_angle"),
@@ -171,6 +187,12 @@ OUTPUTS = {
         f"axes-{mounting}": _recipe(f"body axes of a unit that points {words}", "outputs", "axes", mounting)
         for mounting, words in MOUNTINGS.items()
     },
+}
+
+#: Kernels of the modes of a reference.
+MODES = {
+    "hysteresis": _recipe("switch with two thresholds", "modes", "hysteresis"),
+    "mode-sequence": _recipe("sequence of off, align, navigate, attitude", "modes", "mode_sequence"),
 }
 
 #: Kernels of an attitude held as two rows of its direction cosine matrix.
@@ -194,6 +216,10 @@ LOOPS = {
     "heading-loop": _recipe("heading loop of second order", _LOOPS, "heading_loop"),
     "heading-from-dcm": _recipe("heading of an attitude", _LOOPS, "heading_of_attitude"),
     "vertical-loop": _recipe("vertical loop of third order", _LOOPS, "vertical_loop"),
+    "height-hysteresis": _recipe("hysteresis of the feedback of a height", _LOOPS, "height_hysteresis"),
+    "tuned-rotor-loop": _recipe(
+        "loop of a tuned-rotor gyro with rate observer", "instruments.tuned_rotor", "tuned_rotor_loop"
+    ),
     "pulse-torque": _recipe("control law of a pulse torquing loop", _PULSES, "pulse_torque"),
     "body-feedback": _recipe("feedback of the loops in body axes", _LOOPS, "body_feedback"),
 }
@@ -204,9 +230,11 @@ KERNELS = {
     **TWO_SPEED_LOOPS,
     **COMPENSATION,
     **LAYOUTS,
+    **FILTERS,
     **NAVIGATION,
     **REDUNDANCY,
     **OUTPUTS,
+    **MODES,
     **TWO_ROWS,
     **LOOPS,
 }

@@ -17,21 +17,6 @@ from strapgen.kernel.algebra import Wrapped
 from strapgen.kernel.kernel import Kernel, KernelBuilder
 from strapgen.navigation.frame.frame_rates import FENNER
 
-SAMPLE = Signal.vector("sample", "x", unit=ANY, meaning="what is filtered, any axes", frame=ANY)
-FIRST, SECOND = (
-    Signal.vector(name, name, unit=ANY, meaning=f"state of the {name} integrator, any axes", frame=ANY)
-    for name in ("first", "second")
-)
-LOSS, COUPLING, SQUARE = (
-    Signal.scalar(
-        name, unit="1", meaning=f"{meaning}, K = tan(pi fc/fs), n = 1 + sqrt(2) K + K^2", bound=bound
-    )
-    for name, meaning, bound in (
-        ("loss", "1 - 1/n", Fraction(1)),
-        ("coupling", "K/n", Fraction(3, 10)),
-        ("square", "K^2/n", Fraction(1)),
-    )
-)
 _TURN = Fraction(355, 113)
 _VARIATION = Signal.scalar(
     "variation", unit="rad", meaning="magnetic variation, magnetic less true heading", bound=_TURN
@@ -69,38 +54,6 @@ _AXES = {
     "aft": ((0, -1), (1, -1), (2, 1)),
     "left": ((1, 1), (0, -1), (2, 1)),
 }
-
-
-def butterworth() -> Kernel:
-    """Return a Butterworth filter of second order by the bilinear transformation, as two trapezoidal integrators.
-
-    The analog filter is x1' = w (u - x2 - sqrt(2) x1), x2' = w x1, with w the angular frequency of the edge. By the
-    trapezoidal rule with K = tan(pi fc/fs) in place of w T/2 its transfer function is
-    (K^2/n) (1 + z^-1)^2/(1 + a1 z^-1 + a2 z^-2), n = 1 + sqrt(2) K + K^2, a1 = 2 (K^2 - 1)/n,
-    a2 = (1 - sqrt(2) K + K^2)/n. The states are those of the integrators, so that no cycle lengthens their vector
-    while the input is zero, and a constant input passes unchanged whatever the coefficients are rounded to.
-    """
-    build = KernelBuilder()
-    s1, s2, x = map(build.input, (FIRST, SECOND, SAMPLE))
-    loss, coupling, square = map(build.scalar, (LOSS, COUPLING, SQUARE))
-    # Named, so that a constant passes unchanged: sample and state have one and the same coefficient in every word.
-    meaning = "sample less the second state"
-    apart = build.stage(replace(SAMPLE, name="apart", elements=_named("apart"), meaning=meaning), x - s2)
-    build.feedback(FIRST, s1 + 2 * (coupling * apart - loss * s1))
-    later = build.feedback(SECOND, s2 + 2 * (coupling * s1 + square * apart))
-    filtered = replace(
-        SAMPLE, name="filtered", elements=_named("y"), meaning="the sample, filtered, any axes"
-    )
-    build.output(filtered, (s2 + later) / 2)
-    return build.kernel(
-        "butterworth-2",
-        "Butterworth filter of second order, bilinear, prewarped",
-        f"type printed in {FENNER}; digital form derived: bilinear, prewarped, as integrators",
-        notes=(
-            "For rates and accelerations that are shown or control; never in the way of attitude or velocity.",
-            "Unit any stands for the unit of the sample.",
-        ),
-    )
 
 
 def _named(prefix: str) -> tuple[str, ...]:

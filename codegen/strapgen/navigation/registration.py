@@ -30,7 +30,7 @@ REGISTRATION = Registration(
         "kalman": Command(
             f"{__package__}.kalman.kalman_command:kalman",
             "Generate",
-            summary="Derive a Kalman filter from its description and generate its code",
+            summary="Generate a Kalman filter from its description",
         ),
         "strapdown": Command(
             f"{__package__}.strapdown_command:strapdown",
@@ -60,6 +60,7 @@ REGISTRATION = Registration(
         "system": f"{__package__}.systems.system_file:SYSTEM",
         "loops": f"{__package__}.loops.loop_schedule:SCHEDULE",
         "layout": f"{__package__}.instruments.layout:LAYOUT",
+        "filter": f"{__package__}.filters.filter_file:FILTER",
         "redundancy": f"{__package__}.redundancy.redundancy_kernels:GEOMETRY",
         "calibration": f"{__package__}.calibration:POSITIONS",
         "kalman": f"{__package__}.kalman.kalman_file:KALMAN",
@@ -80,7 +81,7 @@ REGISTRATION = Registration(
         "redundancy": f"{__package__}.redundancy.redundancy_study:RedundancyResult",
         "calibration": f"{__package__}.calibration:CalibrationResult",
         "attitude-form": f"{__package__}.attitude_form:FormResult",
-        "output-filter": f"{__package__}.output_filter:FilterResult",
+        "output-filter": f"{__package__}.filters.filter_study:FilterResult",
         "pulse-torque": f"{__package__}.torquing:TorquingResult",
         "loops": f"{__package__}.loops.loops_study:LoopsResult",
         "rate-table": f"{__package__}.rate_table:RateTableResult",

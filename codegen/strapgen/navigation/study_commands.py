@@ -12,7 +12,7 @@ from typing import Annotated, Any, ClassVar
 import typer
 
 from strapgen.cli.fixed_options import FixedOptions
-from strapgen.cli.option_groups import Needs, OneOf, Shown, grouped, rules
+from strapgen.cli.option_groups import Excludes, Needs, OneOf, Shown, grouped, rules
 from strapgen.cli.options import Duration, FastBackends, OneBackend, Processor, a_backend, option
 from strapgen.cli.output import Output
 from strapgen.cli.progress import track
@@ -42,6 +42,16 @@ _Aligned = Annotated[
         "--aligned",
         help="With --errors: begin with the vertical that the sensors measure, as after an alignment at rest.",
         panel="Input",
+    ),
+]
+_Runs = Annotated[
+    int,
+    option(
+        "--runs",
+        metavar="N",
+        help="Runs, each with numbers of its own.",
+        panel="Run",
+        read=whole(10, 10**5),
     ),
 ]
 
@@ -135,16 +145,7 @@ def study_flight_errors(
     sample_hz: _SampleRate = None,
     errors: SensorFile = None,
     aligned: _Aligned = False,
-    runs: Annotated[
-        int,
-        option(
-            "--runs",
-            metavar="N",
-            help="Runs, each with numbers of its own.",
-            panel="Run",
-            read=whole(10, 10**5),
-        ),
-    ] = 200,
+    runs: _Runs = 200,
     backend: OneBackend = "c",
     output: Output,
 ) -> None:
@@ -252,7 +253,16 @@ def study_attitude_form(
 
 
 @grouped
+@rules(Excludes("FILE", "--cutoff-hz --sample-hz --largest", reason="FILE states the filter"))
 def study_output_filter(
+    file: Annotated[
+        Path | None,
+        typer.Argument(
+            metavar="FILE",
+            help="TOML file with a filter.  [default: a Butterworth filter of second order]",
+            show_default=False,
+        ),
+    ] = None,
     *,
     cutoff_hz: Annotated[
         Positive, option("--cutoff-hz", metavar="HZ", help="Edge, which is damped by 3 dB.", panel="Filter")
@@ -267,11 +277,15 @@ def study_output_filter(
         ),
     ] = Positive("128"),
     frequencies: Annotated[
-        tuple[Number, ...],
+        tuple[Number, ...] | None,
         option(
-            "--frequency-hz", metavar="HZ,...", help="Frequencies that are measured, with sines.", panel="Run"
+            "--frequency-hz",
+            metavar="HZ,...",
+            help="Frequencies that are measured, with sines.  [default: 0.32,1,3.2,8,10,20; of a file its corners, "
+            "half and twice of each]",
+            panel="Run",
         ),
-    ] = tuple(map(Number, ("0.32", "1", "3.2", "8", "10", "20"))),
+    ] = None,
     backend: Annotated[
         tuple[str, ...],
         option(
@@ -284,22 +298,32 @@ def study_output_filter(
     ] = ("c", "c-fixed32", "c-fixed16"),
     output: Output,
 ) -> None:
-    """Measure a Butterworth filter of second order on several back ends, beside its analog and digital response.
+    """Measure a filter on several back ends, beside its analog and digital response.
 
     You also see the error after the filter has settled, for a constant input and for none, without and with error
-    feedback in fixed point, and its bound in a run of any length.
+    feedback in fixed point, and its bound in a run of any length, which no limit cycle exceeds. The filter is that of a
+    file, or a Butterworth filter of second order.
 
     Example: strapgen study output-filter --cutoff-hz 8 --sample-hz 100
-    """
-    output.check()
-    from strapgen.navigation import output_filter as experiment
-    from strapgen.navigation.output_filter import FilterResult, OutputFilter
 
-    edge, size = OutputFilter(float(cutoff_hz), float(sample_hz)), float(largest)
-    tones = experiment.check_frequencies(edge, [*map(float, frequencies)])
+    Example: strapgen study output-filter examples/filters/roll-notch.toml --frequency-hz 1,9.5,15
+    """
+    output.check(file)
+    from strapgen.navigation.filters import filter_study as experiment
+    from strapgen.navigation.filters.filter_file import read
+    from strapgen.navigation.filters.filter_study import AnyFilter, FilterResult, OutputFilter
+
+    size = float(largest)
+    if file is None:
+        measured_filter: AnyFilter = OutputFilter(float(cutoff_hz), float(sample_hz))
+    else:
+        measured_filter = read(file)
+        size = float(measured_filter.range)
+    asked = experiment.usual_frequencies(measured_filter) if frequencies is None else frequencies
+    tones = experiment.check_frequencies(measured_filter, [*map(float, asked)])
     which = experiment.runs([*backend])
-    measured = track(experiment.measure(which, edge, size, tones), "measuring", len(which))
-    output.show(FilterResult.of(edge, size, tones, list(measured)))
+    measured = track(experiment.measure(which, measured_filter, size, tones), "measuring", len(which))
+    output.show(FilterResult.of(measured_filter, size, tones, list(measured)))
 
 
 @grouped
@@ -372,11 +396,24 @@ def study_redundancy(
 
 
 @grouped
+@rules(Needs("--errors-per-degree --runs", "--errors"))
 def study_calibration(
     file: Annotated[
-        Path, typer.Argument(metavar="FILE", help="TOML file with the positions.", show_default=False)
+        Path,
+        typer.Argument(metavar="FILE", help="TOML file with positions and turns.", show_default=False),
     ],
     *,
+    errors: SensorFile = None,
+    errors_per_degree: Annotated[
+        str | None,
+        option(
+            "--errors-per-degree",
+            metavar="FILE",
+            help="TOML file of sensor errors that come in by a degree of temperature.",
+            panel="Input",
+        ),
+    ] = None,
+    runs: _Runs = 200,
     rate_deg_s: Annotated[
         Vector | None,
         option(
@@ -394,20 +431,28 @@ def study_calibration(
     ] = None,
     output: Output,
 ) -> None:
-    """Show which error coefficients of an IMU a set of calibration positions determines, and how accurately.
+    """Show which error coefficients of an IMU a calibration determines, and how accurately.
 
-    In each position the errors of rate and acceleration are measured at rest. You see the exact rank, combinations of
-    coefficients that cannot be observed, and the standard deviation of every other coefficient by least squares; with
-    measured errors in the file, the estimates as well.
+    The errors of rate and acceleration are measured at rest in positions, on a table that turns, and at temperatures.
+    You see the exact rank, combinations of coefficients that cannot be observed, and the standard deviation of every
+    other coefficient by least squares; with measured errors in the file, the estimates as well. A table with headings
+    finds north. With --errors all is run on simulated sensors, and the errors of the estimates stand beside.
 
     Example: strapgen study calibration examples/positions-20.toml --plot out/calibration.png
+
+    Example: strapgen study calibration examples/turning.toml --errors ins-1 --runs 50
     """
-    output.check(file)
+    output.check(file, errors, errors_per_degree)
     from strapgen.navigation.calibration import QUANTITIES, CalibrationResult, calibrated, read
+    from strapgen.navigation.turntable import Session, noise_rows
 
     content = read(file)
-    steps = (calibrated(content.scheme, quantity) for quantity in QUANTITIES)
-    several = list(track(steps, "solving", len(QUANTITIES)))
+    if errors_per_degree is not None and not content.temperatures_c:
+        raise InputError(f"{file}: --errors-per-degree needs temperatures_c")
+    scheme = content.scheme
+    quantities = [*QUANTITIES] if scheme.positions or scheme.turns else []
+    solved = (calibrated(scheme, quantity) for quantity in quantities)
+    several = list(track(solved, "solving", len(quantities)))
     estimates, remaining = {}, {}
     for one in several:
         if one.quantity in content.errors:
@@ -419,7 +464,12 @@ def study_calibration(
             turning = [math.radians(value) for value in rate_deg_s or (0, 0, 0)]
             covariance = one.error_covariance(turning, [*map(float, acceleration_g or (0, 0, 0))])
             remaining[one.quantity] = covariance * content.sigma[one.quantity] ** 2
-    output.show(CalibrationResult.of(content, several, estimates, remaining))
+    headings, variances, simulated = noise_rows(content), None, []
+    if sensors := read_errors(errors):
+        session = Session(content, sensors, read_errors(errors_per_degree))
+        simulated = list(track((session.run(several, number) for number in range(runs)), "running", runs))
+        headings, variances = session.heading_rows(simulated), session.variances
+    output.show(CalibrationResult.of(content, several, estimates, remaining, headings, variances, simulated))
 
 
 @grouped
@@ -431,7 +481,8 @@ def study_pulse_torque(
             "--set",
             metavar="KEY=VALUE...",
             help="Constants: gain, lag_gain, lag_pole, integral_gain, leak, quantum_arcsec, lag_s, cycle_hz, "
-            "largest_deg_s, largest_pulses, delay_cycles.  [default: those of a fit to the printed responses]",
+            "largest_deg_s, largest_pulses, delay_cycles, asymmetry_ppm.  [default: those of a fit to the printed "
+            "responses]",
             panel="Input",
             words="strapgen.navigation.torquing:TorqueLoop",
         ),
@@ -441,7 +492,8 @@ def study_pulse_torque(
     """Run a pulse torquing loop beside the figures of its source.
 
     You see rise, overshoot, offset, bandwidth and the angle under an angular acceleration, for the linear loop and for
-    one with quanta and limits, beside what the source prints. A loop that is unstable is refused.
+    one with quanta and limits, beside what the source prints; and the power and drift of binary and ternary torquing.
+    A loop that is unstable is refused.
 
     Example: strapgen study pulse-torque --plot out/pulse-torque.png
     """

@@ -53,6 +53,8 @@ class TorqueLoop:
     largest_pulses: int = 60
     #: Cycles from a command to its pulses
     delay_cycles: int = 1
+    #: Scale factor of pulses of sign + less that of sign -, for the comparison of `MODULATIONS`; not printed
+    asymmetry_ppm: float = 100.0
 
     def __post_init__(self) -> None:
         for one in fields(self):
@@ -149,17 +151,23 @@ class TorqueLoop:
         gains = [abs(c @ np.linalg.solve(x * np.eye(len(a)) - a, b)) for x in z]
         return np.array(gains)
 
+    def pulses_on(self, command: float, modulation: str) -> float:
+        """Return how many pulses of either sign drive the torquer in a cycle: all of them in binary torquing."""
+        return self.largest_pulses if modulation == "binary" else abs(command)
+
     def run(
         self,
         rate_deg_s: Callable[[Any], Any],
         cycles: int,
         angle_arcsec: float = 0.0,
         quantised: bool = False,
+        modulation: str = "",
     ) -> tuple[Array, Array]:
         """Run the loop.
 
-        `rate_deg_s`: the rate of the gyro's case in deg/s, from times in s. Returns (cycles,): of the float in
-        arcsec at the beginning of each cycle. Returns (cycles,): in pulses.
+        `rate_deg_s`: the rate of the gyro's case in deg/s, from times in s. With a modulation pulses have their
+        asymmetry. Returns (cycles,): of the float in arcsec at the beginning of each cycle. Returns (cycles,): in
+        pulses.
         """
         times = np.arange(cycles) * self.cycle
         rates = rate_deg_s(times) * _ARCSEC + 0 * times
@@ -174,7 +182,8 @@ class TorqueLoop:
                 command = float(max(-self.largest_pulses, min(self.largest_pulses, round(command))))
             angles[k], commands[k] = angle, command
             net = rates[k] - under_way.pop(0) * self.pulse_arcsec * self.cycle_hz
-            under_way.append(command)
+            uneven = self.asymmetry_ppm / 2e6 * self.pulses_on(command, modulation) if modulation else 0.0
+            under_way.append(command + uneven)
             angle, speed = self.plant(angle, speed, net)
         return angles, commands
 
@@ -272,7 +281,52 @@ def torquing_rows(loop: TorqueLoop) -> Iterator[TorquingRow]:
         yield TorquingRow(name, PRINTED[name], *(float(angle[k]) for angle in turning))
 
 
+#: How a command becomes pulses: those of its sign, or all, of both signs, whose difference it is.
+MODULATIONS = ("ternary", "binary")
+#: Rates of their comparison in parts of the largest.
+_PARTS = (0.0, 0.5, -0.5)
+
+
+@dataclass(frozen=True)
+class ModulationRow:
+    """What a modulation of the torquer costs at a rate."""
+
+    #: A name of `MODULATIONS`
+    modulation: str
+    rate_deg_s: float
+    #: Part of the largest power that heats the torquer
+    power: float
+    #: Error of the measured rate by the asymmetry: in closed form, and of a run of the loop without quanta
+    drift_deg_h: float
+    run_drift_deg_h: float
+
+
+def modulation_rows(loop: TorqueLoop) -> Iterator[ModulationRow]:
+    """Compare the modulations: pulses p of both signs turn the float by p a/2 more than their sum, a the asymmetry."""
+    cycles = round(_RATE_S * loop.cycle_hz)
+    per_pulse = loop.pulse_arcsec * loop.cycle_hz  # deg/h is arcsec/s
+    half = loop.asymmetry_ppm / 2e6
+    for modulation in MODULATIONS:
+        for part in _PARTS:
+            rate = part * loop.largest_deg_s
+            _, commands = loop.run(lambda t, rate=rate: rate + 0 * t, cycles, modulation=modulation)  # type: ignore[misc]
+            measured = float(commands[cycles // 2 :].mean())
+            true = rate * _ARCSEC / per_pulse
+            on = loop.pulses_on(measured, modulation)
+            exact = -half * on if modulation == "binary" else true / (1 + math.copysign(half, true)) - true
+            yield ModulationRow(
+                modulation, rate, on / loop.largest_pulses, exact * per_pulse, (measured - true) * per_pulse
+            )
+
+
 _FIGURES = ("printed", "linear", "quantised")
+_MODULATION_COLUMNS = (
+    Column("torquing", "<"),
+    Column("rate, deg/s", spec="g"),
+    Column("power", spec=".3g"),
+    Column("drift, deg/h", spec=".4f"),
+    Column("drift of a run", spec=".4f"),
+)
 #: Frequencies of the printed gains and of a picture in Hz.
 HERTZ = (10, 40, 80, 120)
 
@@ -282,7 +336,7 @@ class TorquingResult(Result):
     """The responses of a pulse torquing loop."""
 
     rows_in = "figures"
-    computed: ClassVar[Properties] = properties(largest_pole=entry(), gains=entry())
+    computed: ClassVar[Properties] = properties(largest_pole=entry(), gains=entry(), modulations=entry())
     drawn_by: ClassVar[str] = f"{__name__}:torquing_image"
 
     loop: TorqueLoop
@@ -299,8 +353,13 @@ class TorquingResult(Result):
         gains = zip(HERTZ, self.loop.response(HERTZ), strict=True)
         return {f"{hertz} Hz": float(gain) for hertz, gain in gains}
 
+    @cached_property
+    def modulations(self) -> list[ModulationRow]:
+        """Binary torquing beside ternary."""
+        return list(modulation_rows(self.loop))
+
     def text(self) -> str:
-        """Return the figures beside the printed ones, and the gains."""
+        """Return the figures beside the printed ones, the gains, and both modulations."""
         table = TextTable(
             [Column("", "<"), *(Column(name, spec=".5g") for name in _FIGURES)],
             [[MEANINGS[row.quantity], *(getattr(row, name) for name in _FIGURES)] for row in self.figures],
@@ -315,6 +374,9 @@ class TorquingResult(Result):
                 f"{self.loop.steady_gain:.6g} pulses a cycle for a quantum",
                 "quantised: angle in whole quanta, command in whole pulses up to the largest; its offset is that at "
                 "99 % of the largest rate",
+                "",
+                f"modulation, scale factors of the signs {self.loop.asymmetry_ppm:g} ppm apart:",
+                *TextTable(_MODULATION_COLUMNS, [[*vars(row).values()] for row in self.modulations]).lines(),
             ]
         )
 

@@ -272,6 +272,13 @@ def _of_constants(path: Path, errors: InstrumentErrors) -> Array:
     return total
 
 
+def single_units(errors: InstrumentErrors) -> list[InstrumentErrors]:
+    """Return units that have each constant of both triads alone."""
+    nothing = replace(errors, gyro=TriadErrors(), accelerometer=TriadErrors(), drawn=False)
+    gyros = [replace(nothing, gyro=one) for one in single_constants(errors.gyro)]
+    return gyros + [replace(nothing, accelerometer=one) for one in single_constants(errors.accelerometer)]
+
+
 def single_constants(triad: TriadErrors) -> list[TriadErrors]:
     """Return the errors of each constant alone."""
     singles: list[TriadErrors] = []

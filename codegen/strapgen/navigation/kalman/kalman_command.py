@@ -54,7 +54,7 @@ def kalman(
     output: Annotated[SourceOptions, Shown(only=("check", "force"))],
     format: Format = "text",
 ) -> None:
-    """Derive a Kalman filter from its description, and generate its code.
+    """Generate a Kalman filter from its description.
 
     A file states the states with their differential equations, the measurements, the noise, and whether gains are
     steady, scheduled or computed online. You see the matrices, the observability, the gains and the costs. With --out

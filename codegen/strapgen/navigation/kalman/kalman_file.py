@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+import shlex
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from pathlib import Path
+from types import MappingProxyType
 from typing import Annotated, Any, ClassVar
 
 import sympy as sp
@@ -14,6 +16,7 @@ import sympy as sp
 from strapgen.catalogue.toml_models import Key, UserFile, parse, rational, refused
 from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError
+from strapgen.kernel.algebra import exact
 from strapgen.kernel.kernel import DIGITS
 from strapgen.kernel.reading import CONSTANTS, FUNCTIONS, expression
 from strapgen.navigation.kalman import FORMS, KINDS
@@ -21,12 +24,14 @@ from strapgen.storage import streams
 from strapgen.targets.names import PYTHON, C
 
 #: Most states, measurements, inputs and steps of a filter.
-MOST_STATES, MOST_STEPS = 32, 1_000_000
+MOST_STATES, MOST_STEPS = 32, 100_000
 _NAME = Key(
     "Name; all names of the file are different",
     pattern="(?!.*__)[a-z][a-z0-9_]{0,30}(?<!_)",
     form="a name of at most 31 lower-case letters, digits and single underscores, which begins with a letter,",
 )
+#: Functions of formulas, which code in floating point and its derivatives have.
+_IN_CODE = {name: FUNCTIONS[name] for name in ("sqrt", "sin", "cos", "atan2")}
 _TAKEN = re.compile(r"state|covariance|measured|innovation(_variance)?|(next|gain)_.*")
 
 
@@ -48,43 +53,36 @@ class Term(str):
         return cls(value)
 
 
+_ZERO = Term("0")
 _UNIT = Key('Unit, "1" for a pure number', pattern=r".*\S.*", form="a unit, '1' for a pure number,")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class InputFile:
     """A signal that derivatives or measurements depend on, held over a step."""
 
     name: Annotated[str, _NAME]
     unit: Annotated[str, _UNIT]
-    range: Annotated[Term, Key("Largest magnitude", "its unit")]
+    range: Annotated[Term | None, Key("Largest magnitude, which fixed point needs", "its unit")] = None
     meaning: Annotated[str, Key("Description in the header; by default its name")] = ""
 
 
-@dataclass(frozen=True)
-class StateFile:
+@dataclass(frozen=True, kw_only=True)
+class StateFile(InputFile):
     """A state and its differential equation."""
 
-    name: Annotated[str, _NAME]
-    unit: Annotated[str, _UNIT]
     derivative: Annotated[Term, Key("Its derivative, in states, inputs, parameters and noise", "its unit/s")]
     deviation: Annotated[Term, Key("Standard deviation before the first step, above 0", "its unit")]
-    range: Annotated[Term | None, Key("Largest magnitude, which fixed point needs", "its unit")] = None
-    initial: Annotated[Term, Key("Estimate before the first step", "its unit")] = field(default=Term("0"))
-    meaning: Annotated[str, Key("Description in the header; by default its name")] = ""
+    initial: Annotated[Term, Key("Estimate before the first step", "its unit")] = _ZERO
 
 
-@dataclass(frozen=True)
-class MeasurementFile:
+@dataclass(frozen=True, kw_only=True)
+class MeasurementFile(InputFile):
     """A scalar measurement."""
 
-    name: Annotated[str, _NAME]
-    unit: Annotated[str, _UNIT]
     expression: Annotated[Term, Key("What is measured, in states, inputs and parameters", "its unit")]
     deviation: Annotated[Term, Key("Standard deviation of the noise of a measurement", "its unit")]
-    every: Annotated[int, Key("Steps from one measurement to the next", "1", least=1, most=MOST_STEPS)] = 1
-    range: Annotated[Term | None, Key("Largest magnitude, which fixed point needs", "its unit")] = None
-    meaning: Annotated[str, Key("Description in the header; by default its name")] = ""
+    every: Annotated[int, Key("Steps from one to the next", "1", least=1, most=MOST_STEPS)] = 1
 
 
 @dataclass(frozen=True)
@@ -94,9 +92,9 @@ class NoiseFile:
     density: Annotated[
         Term | None, Key("Root of the spectral density", "unit of the derivative times sqrt(s)")
     ] = None
-    deviation: Annotated[
-        Term | None, Key("Standard deviation of its integral over a step", "unit of the state")
-    ] = None
+    deviation: Annotated[Term | None, Key("Deviation of its integral over a step", "unit of the state")] = (
+        None
+    )
 
     def __post_init__(self) -> None:
         if (self.density is None) == (self.deviation is None):
@@ -108,19 +106,11 @@ class ScheduleFile:
     """Steps and gains."""
 
     interval: Annotated[Term, Key("Length of a step", "s")]
-    kind: Annotated[
-        str, Key("Gains: steady, of a table of every step, or computed online", choices=tuple(KINDS))
-    ]
+    kind: Annotated[str, Key("Gains: steady, of a table of every step, or online", choices=tuple(KINDS))]
     duration: Annotated[Term | None, Key("Time that a schedule, and a bound, is for", "s")] = None
     form: Annotated[str, Key("Form of the covariance of online gains", choices=tuple(FORMS))] = "joseph"
     order: Annotated[
-        int,
-        Key(
-            "Highest power of the step in the series of a transition that is not constant",
-            "1",
-            least=1,
-            most=8,
-        ),
+        int, Key("Highest power of the step in a transition that is not constant", "1", least=1, most=8)
     ] = 4
 
 
@@ -131,16 +121,15 @@ class KalmanFile:
     state: Annotated[tuple[StateFile, ...], Key("States", least=1, most=MOST_STATES)]
     measurement: Annotated[
         tuple[MeasurementFile, ...],
-        Key("Scalar measurements, in the order of their updates", least=1, most=MOST_STATES),
+        Key("Measurements, in the order of their updates", least=1, most=MOST_STATES),
     ]
     schedule: Annotated[ScheduleFile, Key("Steps and gains")]
-    noise: Annotated[Mapping[Annotated[str, _NAME], NoiseFile], Key("White noise, by name")] = field(
+    noise: Annotated[Mapping[Annotated[str, _NAME], NoiseFile], Key("White noise")] = field(
         default_factory=dict
     )
     input: Annotated[tuple[InputFile, ...], Key("Signals held over a step", most=4 * MOST_STATES)] = ()
     parameters: Annotated[
-        Mapping[Annotated[str, _NAME], Term],
-        Key("Numbers by name, each also as an expression in those above it"),
+        Mapping[Annotated[str, _NAME], Term], Key("Numbers, or expressions in those above")
     ] = field(default_factory=dict)
     name: Annotated[str, replace(_NAME, text="Name in code; by default that of the file")] = ""
     title: Annotated[str, Key("One line for the head of the files")] = "A Kalman filter"
@@ -177,7 +166,7 @@ class FilterText:
     inputs: tuple[Quantity, ...]
     states: tuple[Quantity, ...]
     measurements: tuple[Quantity, ...]
-    #: Symbols of the white noise, and the roots of their spectral densities
+    #: Symbols of the white noise, and its spectral densities
     noise: Mapping[sp.Symbol, Fraction]
     interval: Fraction
     #: Steps of the schedule; None where no duration is stated
@@ -192,80 +181,96 @@ def read(path: str | Path, form: str | None = None) -> FilterText:
     place = checks.path("path", path)
     stem = "kalman" if place == streams.STANDARD else place.stem
     name = re.sub(r"[^a-z0-9]+", "_", stem.lower()).strip("_")
-    return KALMAN.convert(path, lambda file: described(file, name, form, place))
+    command = f"strapgen kalman {shlex.quote(place.as_posix())}"
+    return KALMAN.convert(path, lambda file: described(file, name, form, command))
 
 
-def described(file: KalmanFile, name: str, form: str | None = None, place: Path | None = None) -> FilterText:
+def described(
+    file: KalmanFile, name: str, form: str | None = None, command: str = "strapgen kalman"
+) -> FilterText:
     """Return the filter that a file describes."""
     name = file.name or parse(Annotated[str, _NAME], name, "name")
-    if not (C.allows(name) and PYTHON.allows(name)):
-        raise InputError(f"the name {name!r} has a meaning in generated code; another name is needed")
-    _check_names(file)
-    numbers: dict[str, sp.Expr] = {}
-
-    def number(where: str, text: str | None, least: int | None = None, positive: bool = False) -> Any:
-        if text is None:
-            return None
-        value = expression(where, text, numbers)
-        value = exact_number(where, value)
-        if (positive and value <= 0) or (least is not None and value < least):
-            raise InputError(
-                f"{where} is {text}; a number {'above 0' if positive else f'of at least {least}'} is needed"
-            )
-        return Fraction(value.p, value.q)
-
+    measured = [one.name for one in file.measurement]
+    signals = [one.name for rows in (file.input, file.state) for one in rows]
+    _check_names([*file.parameters, *file.noise, *signals])
+    _check_names(measured)
+    _check_names([name])
+    terms = _Terms({name: sp.Symbol(name, real=True) for name in signals})
     for key, text in file.parameters.items():
-        numbers[key] = exact_number(f"parameters.{key}", expression(f"parameters.{key}", text, numbers))
-
-    def quantity(kind: str, one: Any, known: Mapping[str, Any], term: str = "", **rest: Any) -> Quantity:
-        where = f"{kind}[{one.name}]"
-        formula = expression(f"{where}.{term}", getattr(one, term), known) if term else sp.S.Zero
-        formula = formula.replace(
-            lambda part: part.is_number, lambda part: exact_number(f"{where}.{term}", part)
-        )
-        largest = number(f"{where}.range", one.range, positive=True)
-        meaning = checks.text(f"{where}.meaning", one.meaning) or one.name.replace("_", " ")
-        return Quantity(one.name, one.unit, meaning, sp.Symbol(one.name, real=True), largest, formula, **rest)
-
-    inputs = tuple(quantity("input", one, {}) for one in file.input)
-    signals: tuple[Any, ...] = (*file.input, *file.state)
-    named = {one.name: sp.Symbol(one.name, real=True) for one in signals}
+        terms.parameters[key] = exact(terms.number(f"parameters.{key}", text))
     noises = {key: sp.Symbol(key, real=True) for key in file.noise}
-    interval = number("schedule.interval", file.schedule.interval, positive=True)
-    states = tuple(
-        quantity(
-            *("state", one, {**numbers, **named, **noises}, "derivative"),
-            deviation=number(f"state[{one.name}].deviation", one.deviation, positive=True),
-            initial=number(f"state[{one.name}].initial", one.initial),
-        )
-        for one in file.state
-    )
-    measurements = tuple(
-        quantity(
-            *("measurement", one, {**numbers, **named}, "expression"),
-            deviation=number(f"measurement[{one.name}].deviation", one.deviation, least=0),
-            every=one.every,
-        )
-        for one in file.measurement
-    )
+    schedule = file.schedule
+    interval = terms.number("schedule.interval", schedule.interval, above=0)
+    steps = None
+    if schedule.duration is not None:
+        ratio = terms.number("schedule.duration", schedule.duration, above=0) / interval
+        if ratio.denominator != 1:
+            raise InputError(
+                f"schedule.duration is {schedule.duration}; a multiple of the interval is needed"
+            )
+        steps = checks.count("schedule.duration in intervals", int(ratio), largest=MOST_STEPS)
+    elif schedule.kind == "scheduled":
+        raise InputError("schedule.duration is missing; a scheduled filter has gains for every step of it")
+    densities = {}
+    for key, one in file.noise.items():
+        part, over = ("deviation", interval) if one.density is None else ("density", Fraction(1))
+        densities[noises[key]] = terms.number(f"noise.{key}.{part}", getattr(one, part), least=0) ** 2 / over
     return FilterText(
         name,
         file.title,
-        f"strapgen kalman {place.as_posix()}" if place else "strapgen kalman",
-        inputs,
-        states,
-        measurements,
-        {noises[key]: _density(key, one, number, interval) for key, one in file.noise.items()},
+        command,
+        tuple(terms.quantity("input", one) for one in file.input),
+        tuple(terms.quantity("state", one, "derivative", noises, above=0) for one in file.state),
+        tuple(terms.quantity("measurement", one, "expression", least=0) for one in file.measurement),
+        densities,
         interval,
-        _steps(file.schedule, number, interval),
-        file.schedule.kind,
-        checks.choice("form", form, FORMS) if form else file.schedule.form,
-        file.schedule.order,
+        steps,
+        schedule.kind,
+        checks.choice("form", form, FORMS) if form else schedule.form,
+        schedule.order,
     )
 
 
-def exact_number(where: str, value: sp.Expr) -> sp.Rational:
-    """Return a number as a rational one; what is irrational is rounded to `DIGITS` digits."""
+@dataclass
+class _Terms:
+    """Reads the terms of a file: exact numbers, and expressions in its names."""
+
+    symbols: Mapping[str, sp.Symbol]
+    parameters: dict[str, sp.Expr] = field(default_factory=dict)
+
+    def number(self, where: str, text: str, above: int | None = None, least: int | None = None) -> Fraction:
+        """Return a number; one that is irrational is rounded to `DIGITS` digits."""
+        value = _rational(where, expression(where, text, self.parameters))
+        if (above is not None and value <= above) or (least is not None and value < least):
+            limit = f"above {above}" if least is None else f"of at least {least}"
+            raise InputError(f"{where} is {text}; a number {limit} is needed")
+        return Fraction(value.p, value.q)
+
+    def quantity(
+        self,
+        kind: str,
+        one: Any,
+        term: str = "",
+        more: Mapping[str, Any] = MappingProxyType({}),
+        **limit: int,
+    ) -> Quantity:
+        """Return an input, a state or a measurement, with the formula of its `term`."""
+        where, known = f"{kind}[{one.name}]", {**self.parameters, **self.symbols, **more}
+        rest: dict[str, Any] = {}
+        if term:
+            place = f"{where}.{term}"
+            formula = expression(place, getattr(one, term), known, _IN_CODE)
+            rest["expression"] = formula.replace(lambda x: x.is_number, lambda x: _rational(place, x))
+            rest["deviation"] = self.number(f"{where}.deviation", one.deviation, **limit)
+        if kind == "state":
+            rest["initial"] = self.number(f"{where}.initial", one.initial)
+        largest = None if one.range is None else self.number(f"{where}.range", one.range, above=0)
+        meaning = checks.text(f"{where}.meaning", one.meaning) or one.name.replace("_", " ")
+        rest["every"] = getattr(one, "every", 1)
+        return Quantity(one.name, one.unit, meaning, sp.Symbol(one.name, real=True), largest, **rest)
+
+
+def _rational(where: str, value: sp.Expr) -> sp.Rational:
     if value.is_Rational:
         return value
     if not value.is_real or not value.is_finite:
@@ -273,34 +278,10 @@ def exact_number(where: str, value: sp.Expr) -> sp.Rational:
     return sp.Rational(str(sp.N(value, DIGITS)))
 
 
-def _check_names(file: KalmanFile) -> None:
-    signals: tuple[Any, ...] = (*file.input, *file.state)
-    names = [*file.parameters, *file.noise, *(one.name for one in signals)]
-    measured = [one.name for one in file.measurement]
-    for name in [*names, *measured]:
-        if names.count(name) > 1 or measured.count(name) > 1:
+def _check_names(names: Sequence[str]) -> None:
+    for name in names:
+        if names.count(name) > 1:
             raise InputError(f"the name {name!r} stands twice; all names of a filter are different")
         known = name in FUNCTIONS or name in CONSTANTS or _TAKEN.fullmatch(name)
         if known or not (C.allows(name) and PYTHON.allows(name)):
             raise InputError(f"the name {name!r} has a meaning in formulas or code; another name is needed")
-
-
-def _density(name: str, one: NoiseFile, number: Any, interval: Fraction) -> Fraction:
-    """Return the spectral density of a noise, the square of its root."""
-    if one.density is not None:
-        return Fraction(number(f"noise.{name}.density", one.density, least=0) ** 2)
-    return Fraction(number(f"noise.{name}.deviation", one.deviation, least=0) ** 2 / interval)
-
-
-def _steps(schedule: ScheduleFile, number: Any, interval: Fraction) -> int | None:
-    duration = number("schedule.duration", schedule.duration, positive=True)
-    if duration is None:
-        if schedule.kind == "scheduled":
-            raise InputError(
-                "schedule.duration is missing; a scheduled filter has gains for every step of it"
-            )
-        return None
-    steps = duration / interval
-    if steps.denominator != 1:
-        raise InputError(f"schedule.duration is {schedule.duration}; a multiple of the interval is needed")
-    return checks.count("schedule.duration in intervals", int(steps), largest=MOST_STEPS)

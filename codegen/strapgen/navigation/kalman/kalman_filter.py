@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -19,18 +19,15 @@ from strapgen.ir.formats import Format
 from strapgen.ir.notebook_display import Records, short_repr
 from strapgen.ir.program import Program
 from strapgen.ir.sources import Sources
+from strapgen.kernel.kernel import Kernel
 from strapgen.navigation.kalman import FORMS, kalman_file, riccati
-from strapgen.navigation.kalman.kalman_file import FilterText
-from strapgen.navigation.kalman.kalman_kernels import FilterKernel, kernels, triangle
-from strapgen.navigation.kalman.kalman_model import FilterModel, Observability
+from strapgen.navigation.kalman.kalman_kernels import kernels, triangle
+from strapgen.navigation.kalman.kalman_model import FilterModel
 from strapgen.run.backend_names import BACKENDS, of_sources
 from strapgen.run.evaluators import Array, Evaluator
 from strapgen.run.kernel_sources import sources_of_program
 from strapgen.storage.cache import stored
 from strapgen.targets import TARGETS
-
-if TYPE_CHECKING:
-    import sympy as sp
 
 Arrays = Mapping[str, Any]
 
@@ -63,7 +60,7 @@ def kalman(path: str | Path, form: str | None = None) -> KalmanFilter:
         raise InputError(f"{path}: {error}") from None
 
 
-class KalmanFilter:
+class KalmanFilter(FilterModel):
     """A Kalman filter: matrices in exact numbers, gains, and generated code that runs.
 
     Parameters
@@ -93,52 +90,32 @@ class KalmanFilter:
     __repr__ = short_repr
 
     def _in_words(self) -> str:
-        gains = f"{self.text.kind} gains" if self.text.kind != "online" else f"online, {self.text.form}"
+        gains = f"{self.text.kind} gains" if self.is_fixed_gain else f"online, {self.text.form}"
         return f"{self.text.name}: {len(self.states)} states, {len(self.measurements)} measurements, {gains}"
 
-    def __init__(self, text: FilterText) -> None:
-        self.text = text
-        self.model = FilterModel(text)
-        self.states, self.measurements, self.inputs = (
-            tuple(one.name for one in part) for part in (text.states, text.measurements, text.inputs)
-        )
-        if self.is_fixed_gain:
-            _ = self.solved
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        _ = self.solved
+
+    @property
+    def states(self) -> tuple[str, ...]:
+        """Names of the states."""
+        return tuple(one.name for one in self.text.states)
+
+    @property
+    def measurements(self) -> tuple[str, ...]:
+        """Names of the measurements."""
+        return tuple(one.name for one in self.text.measurements)
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """Names of the inputs."""
+        return tuple(one.name for one in self.text.inputs)
 
     @property
     def is_fixed_gain(self) -> bool:
         """Whether the gains are computed before."""
         return self.text.kind != "online"
-
-    @property
-    def F(self) -> sp.Matrix:
-        """Derivatives of the states' derivatives by the states."""
-        return self.model.F
-
-    @property
-    def G(self) -> sp.Matrix:
-        """Derivatives of the states' derivatives by the noise."""
-        return self.model.G
-
-    @property
-    def H(self) -> sp.Matrix:
-        """Derivatives of the measurements by the states."""
-        return self.model.H
-
-    @property
-    def transition(self) -> sp.Matrix:
-        """The transition of a step."""
-        return self.model.transition
-
-    @property
-    def Q(self) -> sp.Matrix:
-        """Covariance of the noise of a step."""
-        return self.model.Q
-
-    @property
-    def observability(self) -> Observability:
-        """The rank of the observability matrix, and what no measurement shows."""
-        return self.model.observability
 
     @cached_property
     def solved(self) -> riccati.Gains | None:
@@ -146,7 +123,7 @@ class KalmanFilter:
         if not self.is_fixed_gain:
             return None
         solve = riccati.steady if self.text.kind == "steady" else riccati.scheduled
-        return stored("kalman-gains", [repr(self.text)], lambda: solve(self.model))
+        return stored("kalman-gains", [repr(self.text)], lambda: solve(self))
 
     @cached_property
     def gains(self) -> dict[str, Array] | None:
@@ -156,15 +133,9 @@ class KalmanFilter:
         rows = {name: np.array(one, float) for name, one in self.solved.rows.items()}
         return {name: one[0] for name, one in rows.items()} if self.text.kind == "steady" else rows
 
-    def kernels(self, form: str | None = None) -> list[FilterKernel]:
-        """Return the kernels: the time update, and the update of each measurement.
-
-        Parameters
-        ----------
-        form : str, optional
-            "joseph" or "ud", in place of that of the filter.
-        """
-        return kernels(self.with_form(form).model, None if self.solved is None else self.solved.rows)
+    def kernels(self, form: str | None = None) -> list[Kernel]:
+        """Return the kernels, the time update first; `form` takes the place of that of the filter."""
+        return kernels(self.with_form(form), self.solved.rows if self.solved else None)
 
     def with_form(self, form: str | None) -> KalmanFilter:
         """Return the filter with another form of its covariance."""
@@ -179,7 +150,7 @@ class KalmanFilter:
         return stored(
             "kalman-programs",
             [repr(self.text)],
-            lambda: [pipeline.lower(one.kernel) for one in self.kernels()],
+            lambda: [pipeline.lower(kernel) for kernel in self.kernels()],
         )
 
     def sources(self, target: str, settings: Settings | None = None) -> list[Sources]:
@@ -212,7 +183,12 @@ class KalmanFilter:
                 f"{target} goes with steady or scheduled gains; a covariance that is computed online takes floating "
                 "point"
             )
-        for kind, rows in (("state", self.text.states), ("measurement", self.text.measurements)):
+        text = self.text
+        for kind, rows in (
+            ("input", text.inputs),
+            ("state", text.states),
+            ("measurement", text.measurements),
+        ):
             for one in rows:
                 if one.range is None:
                     raise InputError(f"{kind}[{one.name}].range is missing; fixed point needs it")
@@ -300,31 +276,17 @@ class KalmanFilter:
 
 @dataclass(frozen=True)
 class FilterRun(Records):
-    """What a filter estimated.
+    """What a filter estimated: before the first step, and after each of N."""
 
-    Parameters
-    ----------
-    names : tuple of str
-        The states.
-    states : array, (..., N + 1, n)
-        Estimates, before the first step and after each.
-    covariances : array, (..., N + 1, n, n), or None
-        Covariances, where they are computed online.
-    innovations : dict of str to array, (..., N)
-        Measured less expected, by the measurement; nan where there was none.
-    variances : dict of str to array, (..., N), or None
-        Variances of the innovations.
-
-    Examples
-    --------
-    >>> FilterRun(("bias",), np.zeros((3, 1)), None, {}, None)
-    FilterRun(2 steps of bias)
-    """
-
+    #: The n states
     names: tuple[str, ...]
+    #: Estimates, (..., N + 1, n)
     states: Array
+    #: Covariances, (..., N + 1, n, n); None where gains are computed before
     covariances: Array | None
+    #: Measured less expected, (..., N) by the measurement; nan where there was none
     innovations: dict[str, Array]
+    #: Variances of the innovations; None as for the covariances
     variances: dict[str, Array] | None
 
     __repr__ = short_repr
@@ -336,17 +298,8 @@ class FilterRun(Records):
 class FilterStepper:
     """A filter on a back end, called step by step.
 
-    Parameters
-    ----------
-    model : KalmanFilter
-    backend : str
-    word : int or None
-
-    Examples
-    --------
     >>> stepper = kalman("examples/kalman/gyrocompass.toml").on("numpy")
-    >>> state, covariance = stepper.time_update(*stepper.start())
-    >>> state
+    >>> stepper.time_update(*stepper.start())[0]
     array([0., 0., 0.])
     """
 

@@ -7,10 +7,9 @@ take a scalar for each state, so that each has a format of its own in fixed poin
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from fractions import Fraction
-from typing import NamedTuple
 
 import sympy as sp
 
@@ -18,7 +17,7 @@ from strapgen.ir.signals import Signal
 from strapgen.kernel.algebra import exact
 from strapgen.kernel.kernel import Kernel, KernelBuilder
 from strapgen.navigation.kalman.kalman_file import Quantity
-from strapgen.navigation.kalman.kalman_model import FilterModel
+from strapgen.navigation.kalman.kalman_model import FilterModel, Step, dot, multiply
 
 _SOURCES = {
     "joseph": "P. S. Maybeck, Stochastic Models, Estimation and Control 1 (1979), Joseph's form",
@@ -27,28 +26,20 @@ _SOURCES = {
 }
 
 
-class FilterKernel(NamedTuple):
-    """A kernel of a filter: the time update, or the update of a measurement."""
-
-    kernel: Kernel
-    #: None for the time update
-    measurement: Quantity | None
+#: Part of the noise of a state below which it is that of others alone.
+_RANK = sp.Rational(1, 10**40)
 
 
-def kernels(
-    model: FilterModel, gains: Mapping[str, Sequence[Sequence[Fraction]]] | None
-) -> list[FilterKernel]:
-    """Return the kernels of a filter; without `gains` its covariance is computed online.
+def kernels(model: FilterModel, gains: Mapping[str, Sequence[Sequence[Fraction]]] | None) -> list[Kernel]:
+    """Return the kernels of a filter, the time update first; without `gains` its covariance is computed online.
 
     `gains`: rows of gains by the measurement; a single row is a constant of the code.
     """
     form = "fixed" if gains is not None else model.text.form
     builders: dict[str, type[_Builder]] = {"joseph": _Joseph, "ud": _Factors, "fixed": _Fixed}
     build = builders[form]
-    return [
-        FilterKernel(build(model, None, gains).time_update(), None),
-        *(FilterKernel(build(model, one, gains).update(), one) for one in model.text.measurements),
-    ]
+    updates = [build(model, one, gains).update() for one in model.text.measurements]
+    return [build(model, None, gains).time_update(), *updates]
 
 
 def triangle(size: int) -> list[tuple[int, int]]:
@@ -105,7 +96,7 @@ class _Builder:
     def declare_covariance(self) -> None:
         """Declare the covariance, where there is one."""
 
-    def declare_triangle(self, meaning: str, diagonal: str = "P") -> sp.Matrix:
+    def declare_triangle(self, meaning: str) -> sp.Matrix:
         """Declare an upper triangle, and return its symbols in a matrix."""
         labels = [f"{i + 1}_{j + 1}" for i, j in triangle(self.size)]
         self.upper = Signal.labelled(
@@ -124,48 +115,30 @@ class _Builder:
 
     def named_all(self, name: str, matrix: sp.Matrix) -> sp.Matrix:
         """Return a matrix whose elements have names."""
-        return sp.Matrix(
-            *matrix.shape,
-            [
-                self.named(f"{name}_{i + 1}_{j + 1}", matrix[i, j])
-                for i in range(matrix.rows)
-                for j in range(matrix.cols)
-            ],
-        )
+        return sp.Matrix(*matrix.shape, lambda i, j: self.named(f"{name}_{i + 1}_{j + 1}", matrix[i, j]))
 
     def at(self, expression: sp.Expr) -> sp.Expr:
         """Return an expression in the symbols of the estimate."""
         return expression.xreplace(dict(zip(self.model.x, self.states, strict=True)))
 
-    def discretize(self) -> None:
-        """Name transition and noise of the step, and set the estimate after it."""
+    def discretize(self) -> Step | None:
+        """Set the estimate after the step; return transition and noise where they are not constant."""
         model, T = self.model, exact(self.text.interval)
-        self.gamma: sp.Matrix | None = None
-        self.weights: list[sp.Expr] = []
         if model.is_constant:
-            self.transition = model.transition
-            moved = model.transition * sp.Matrix(self.states) + model.forcing * model.drift.applyfunc(self.at)
-            self.after = list(moved)
-            return
-        F, G = (
-            self.named_all(name, part.applyfunc(self.at)) for name, part in (("F", model.F), ("G", model.G))
-        )
-        terms = [sp.eye(self.size)]
-        for j in range(1, model.order + 1):
-            terms.append(self.named_all(f"F{j}", multiply(terms[-1], F * T / j)))
-        self.transition = self.named_all("Phi", sum(terms[1:], terms[0]))
-        self.gamma, self.weights = model.factors_of(
-            [multiply(term, G) for term in terms[: model.noise_terms]]
-        )
-        self.gamma = self.named_all("Gamma", self.gamma)
+            drift = model.forcing * model.drift.applyfunc(self.at)
+            self.after = list(model.transition * sp.Matrix(self.states) + drift)
+            return None
+        F, G = (self.named_all(name, getattr(model, name).applyfunc(self.at)) for name in "FG")
+        step = model.discretized(F, G, self.named_all)
         change = self.named_all("f1", model.f.applyfunc(self.at))
         total = change * T
         for j in range(1, model.order):
             change = self.named_all(f"f{j + 1}", multiply(F, change) * T / (j + 1))
             total += change * T
         self.after = [x + dx for x, dx in zip(self.states, total, strict=True)]
+        return step
 
-    def finish(self, kind: str, notes: Iterable[str] = ()) -> Kernel:
+    def finish(self, kind: str) -> Kernel:
         """Return the kernel."""
         what = "time update" if self.measurement is None else f"update by {self.measurement.meaning}"
         name = "time" if self.measurement is None else self.measurement.name.replace("_", "-")
@@ -174,8 +147,13 @@ class _Builder:
             f"{self.text.title}: {what}{kind}",
             _SOURCES[self.form],
             arguments=self.text.command,
-            notes=tuple(notes),
         )
+
+    def moved(self, upper: sp.Matrix) -> Kernel:
+        """Return the change of estimate and covariance."""
+        self.build.feedback(self.vector, self.after)
+        self.build.feedback(self.upper, [upper[place] for place in triangle(self.size)])
+        return self.finish(f", {self.form}")
 
     def innovation(self) -> sp.Symbol:
         """Return the innovation, as an output."""
@@ -200,13 +178,11 @@ class _Builder:
         """Return the update of estimate and covariance."""
         assert self.measurement is not None
         innovation = self.innovation()
-        meaning = "variance of the innovation"
-        unit = self.measurement.unit
-        squared = "1" if unit == "1" else f"({unit})^2"
-        self.build.output(Signal.scalar("innovation_variance", unit=squared, meaning=meaning), [variance])
-        self.build.feedback(self.vector, [x + k * innovation for x, k in zip(self.states, gain, strict=True)])
-        self.build.feedback(self.upper, [upper[place] for place in triangle(self.size)])
-        return self.finish(f", {self.form}")
+        unit = "1" if self.measurement.unit == "1" else f"({self.measurement.unit})^2"
+        signal = Signal.scalar("innovation_variance", unit=unit, meaning="variance of the innovation")
+        self.build.output(signal, [variance])
+        self.after = [x + k * innovation for x, k in zip(self.states, gain, strict=True)]
+        return self.moved(upper)
 
 
 class _Joseph(_Builder):
@@ -220,16 +196,14 @@ class _Joseph(_Builder):
 
     def time_update(self) -> Kernel:
         """Return the time update, Phi P Phi' + Q."""
-        self.discretize()
-        half = self.named_all("A", multiply(self.transition, self.covariance))
-        gamma = self.gamma
-        Q = self.model.Q if gamma is None else multiply(gamma, sp.diag(*self.weights) * gamma.T)
+        step, model = self.discretize(), self.model
+        transition = step.transition if step else model.transition
+        Q = multiply(step.gamma, sp.diag(*step.weights) * step.gamma.T) if step else model.Q
+        half = self.named_all("A", multiply(transition, self.covariance))
         upper = sp.zeros(self.size)
         for i, j in triangle(self.size):
-            upper[i, j] = dot(half[i, :], self.transition[j, :]) + Q[i, j]
-        self.build.feedback(self.vector, self.after)
-        self.build.feedback(self.upper, [upper[place] for place in triangle(self.size)])
-        return self.finish(", covariance")
+            upper[i, j] = dot(half[i, :], transition[j, :]) + Q[i, j]
+        return self.moved(upper)
 
     def update(self) -> Kernel:
         """Return the update by a measurement."""
@@ -260,9 +234,10 @@ class _Factors(_Builder):
 
     def time_update(self) -> Kernel:
         """Return the time update by weighted Gram-Schmidt orthogonalization."""
-        self.discretize()
-        gamma, weights = factors(self.model.Q) if self.gamma is None else (self.gamma, self.weights)
-        product = sp.Matrix.hstack(self.named_all("W", multiply(self.transition, self.U)), gamma)
+        step = self.discretize()
+        gamma, weights = (step.gamma, step.weights) if step else factors(self.model.Q)
+        transition = step.transition if step else self.model.transition
+        product = sp.Matrix.hstack(self.named_all("W", multiply(transition, self.U)), gamma)
         rows = [list(product[i, :]) for i in range(self.size)]
         weights = [*self.D, *weights]
         upper = sp.zeros(self.size)
@@ -279,9 +254,7 @@ class _Factors(_Builder):
                     self.named(f"A_{i + 1}_{c + 1}_{j + 1}", a - upper[i, j] * b)
                     for c, (a, b) in enumerate(zip(rows[i], rows[j], strict=True))
                 ]
-        self.build.feedback(self.vector, self.after)
-        self.build.feedback(self.upper, [upper[place] for place in triangle(self.size)])
-        return self.finish(", ud")
+        return self.moved(upper)
 
     def update(self) -> Kernel:
         """Return Bierman's update by a measurement."""
@@ -324,15 +297,20 @@ class _Fixed(_Builder):
         """Return the update by a measurement."""
         assert self.measurement is not None and self.gains is not None
         rows = self.gains[self.measurement.name]
-        if len(rows) == 1:
-            gain: list[sp.Expr] = [exact(number) for number in rows[0]]
-        else:
-            gain = [
-                self.build.scalar(gain_signal(one, self.measurement, max(abs(row[k]) for row in rows)))
-                for k, one in enumerate(self.text.states)
-            ]
+        gain: list[sp.Expr] = [exact(number) for number in rows[0]]
+        if self.text.kind == "scheduled":
+            gain = [self.build.scalar(self._gain(k, rows)) for k in range(self.size)]
         innovation = self.innovation()
         return self._next([x + k * innovation for x, k in zip(self.states, gain, strict=True)])
+
+    def _gain(self, place: int, rows: Sequence[Sequence[Fraction]]) -> Signal:
+        """Return the signal of the gain of a state, by its place."""
+        one, measurement = self.text.states[place], self.measurement
+        assert measurement is not None
+        largest = max(abs(row[place]) for row in rows) or Fraction(1)
+        meaning = f"gain from {measurement.meaning} to {one.meaning}, of the schedule"
+        unit = f"({one.unit})/({measurement.unit})"
+        return Signal.scalar(f"gain_{one.name}", unit=unit, meaning=meaning, bound=largest)
 
     def _next(self, after: Sequence[sp.Expr]) -> Kernel:
         for one, expression in zip(self.text.states, after, strict=True):
@@ -340,32 +318,15 @@ class _Fixed(_Builder):
         return self.finish(f", {self.text.kind} gains")
 
 
-def gain_signal(state: Quantity, measurement: Quantity, largest: Fraction) -> Signal:
-    """Return the signal of the gain from a measurement to a state."""
-    unit = f"({state.unit})/({measurement.unit})"
-    meaning = f"gain from {measurement.meaning} to {state.meaning}, a number of the schedule"
-    return Signal.scalar(f"gain_{state.name}", unit=unit, meaning=meaning, bound=largest or Fraction(1))
-
-
 def _signal(one: Quantity) -> Signal:
     return Signal.scalar(one.name, unit=one.unit, meaning=one.meaning, bound=one.range)
-
-
-def dot(left: Iterable[sp.Expr], right: Iterable[sp.Expr]) -> sp.Expr:
-    """Return a scalar product, not multiplied out."""
-    return sp.Add(*(a * b for a, b in zip(left, right, strict=True) if a != 0 and b != 0))
-
-
-def multiply(left: sp.Matrix, right: sp.Matrix) -> sp.Matrix:
-    """Return a product of matrices, not multiplied out."""
-    return sp.Matrix(left.rows, right.cols, lambda i, j: dot(left[i, :], right[:, j]))
 
 
 def factors(Q: sp.Matrix) -> tuple[sp.Matrix, list[sp.Expr]]:
     """Return columns and weights of a positive semidefinite matrix of numbers, Q = sum of weight column column'."""
     rest, columns, weights = Q.copy(), [], []
     for j in reversed(range(Q.rows)):
-        if rest[j, j] > 0:
+        if rest[j, j] > Q[j, j] * _RANK:
             column = rest[:, j] / rest[j, j]
             columns.append(column)
             weights.append(rest[j, j])

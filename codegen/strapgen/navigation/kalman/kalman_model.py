@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import math
 import random
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
+from typing import NamedTuple
 
+import numpy as np
 import sympy as sp
+from numpy.typing import NDArray
 from sympy.polys.matrices import DomainMatrix
 
 from strapgen.ir.exceptions import InputError
@@ -18,7 +21,9 @@ from strapgen.kernel.kernel import DIGITS
 from strapgen.navigation.kalman.kalman_file import FilterText
 
 #: What the series of a constant transition may leave out, and the most terms of it.
-_LEFT_OUT, _MOST_TERMS = Fraction(1, 10**30), 60
+_LEFT_OUT, _MOST_TERMS = 1e-30, 60
+#: What covers the rounding of a bound in double.
+_SPARE = 1e-9
 #: Most states and symbols with which combinations are solved for in symbols, beyond which at general numbers.
 _SYMBOLIC = 8, 4
 #: Magnitude above which an eigenvalue does not decay: 1, less what computing it in 50 digits may add.
@@ -33,6 +38,16 @@ class Observability:
     rank: int
     #: Combinations of states that cannot be observed, as text
     unobservable: tuple[str, ...]
+
+
+class Step(NamedTuple):
+    """The discretization of a step; the noise is gamma diag(weights) gamma', positive semidefinite."""
+
+    transition: sp.Matrix
+    #: F^j T^j/j!, from the identity on
+    terms: list[sp.Matrix]
+    gamma: sp.Matrix
+    weights: list[sp.Expr]
 
 
 @dataclass(frozen=True)
@@ -140,140 +155,131 @@ class FilterModel:
         return self.is_constant and not any(self.F ** (self.order + 1))
 
     @cached_property
-    def left_out(self) -> Fraction | None:
-        """Bound of what the series of the transition leaves out, each state by its range; None where none is known."""
-        return Fraction(0) if self.is_nilpotent else self._left_out(self.order)
+    def left_out(self) -> float | None:
+        """Bound of what the series of the transition leaves out, each state by its range; None where none is known.
 
-    def _left_out(self, order: int) -> Fraction | None:
-        size = self._norm
-        if size is None or size >= order + 2:
+        The initial deviation takes the place of a range that is not stated.
+        """
+        return 0.0 if self.is_nilpotent else self._left_out(self.order)
+
+    def _left_out(self, order: int) -> float | None:
+        if self._scaled is None or (norm := float(self._scaled.sum(axis=1).max())) >= order + 2:
             return None
-        return size ** (order + 1) / math.factorial(order + 1) / (1 - size / (order + 2))
+        # Of a matrix without negative elements: the terms that follow are at most a geometric series.
+        first = float(np.linalg.matrix_power(self._scaled, order + 1).sum(axis=1).max())
+        return first / math.factorial(order + 1) / (1 - norm / (order + 2)) * (1 + _SPARE)
 
     @cached_property
-    def _norm(self) -> Fraction | None:
-        """Bound of the largest sum of a row of F times the interval, each state in units of its range."""
+    def _scaled(self) -> NDArray[np.float64] | None:
+        """Bounds of the elements of F T, each state in units of its range; None where there are none."""
         scales = [one.range or one.deviation for one in self.text.states]
-        largest = Fraction(0)
-        for row, scale in enumerate(scales):
-            sizes = [self._magnitude(entry) for entry in self.F[row, :]]
-            total = sum(
-                (size * other for size, other in zip(sizes, scales, strict=True) if size), Fraction(0)
-            )
-            if None in sizes:
-                return None
-            largest = max(largest, total / scale * self.text.interval)
-        return Fraction(math.ceil(largest * 10**12), 10**12)
+        sizes = [[self._magnitude(entry) for entry in self.F[row, :]] for row in range(len(scales))]
+        if any(size is None for row in sizes for size in row):
+            return None
+        T = self.text.interval
+        return np.array(
+            [
+                [
+                    float((size or 0) * other / scale * T) * (1 + _SPARE)
+                    for size, other in zip(row, scales, strict=True)
+                ]
+                for row, scale in zip(sizes, scales, strict=True)
+            ]
+        )
 
     def _magnitude(self, entry: sp.Expr) -> Fraction | None:
         """Return a bound of a polynomial over the ranges of inputs and states; None where there is none."""
-        symbols = sorted(entry.free_symbols, key=str)
         ranges = {one.symbol: one.range for one in (*self.text.inputs, *self.text.states)}
-        if not symbols:
-            return Fraction(entry.p, entry.q) if entry >= 0 else -Fraction(entry.p, entry.q)
-        known = {symbol: ranges[symbol] or Fraction(0) for symbol in symbols}
-        if not entry.is_polynomial(*symbols) or not all(known.values()):
+        symbols = sorted(entry.free_symbols, key=str) or [sp.Dummy()]
+        known = [ranges.get(symbol, Fraction(1)) for symbol in symbols]
+        if not entry.is_polynomial(*symbols) or None in known:
             return None
-        terms = sp.Poly(entry, *symbols).terms()
-        return sum(
-            (
-                abs(Fraction(c.p, c.q))
-                * math.prod(known[s] ** k for s, k in zip(symbols, powers, strict=True))
-                for powers, c in terms
-            ),
-            Fraction(0),
-        )
+        total = Fraction(0)
+        for powers, c in sp.Poly(entry, *symbols).terms():
+            total += abs(Fraction(c.p, c.q)) * math.prod(
+                (x or 0) ** k for x, k in zip(known, powers, strict=True)
+            )
+        return total
 
-    @cached_property
-    def _terms(self) -> list[sp.Matrix]:
-        """F^j T^j/j!, from the identity to that of the order."""
-        step, terms = self.F * exact(self.text.interval), [sp.eye(len(self.x))]
-        for j in range(1, self.order + 1):
-            terms.append(_rounded(_product(terms[-1], step) / j))
-        return terms
+    def discretized(self, F: sp.Matrix, G: sp.Matrix, named: Callable[[str, sp.Matrix], sp.Matrix]) -> Step:
+        """Return the discretization of F and G; `named` returns a matrix on the way, by its label, to go on with.
 
-    @cached_property
-    def transition(self) -> sp.Matrix:
-        """Phi, the sum of F^j T^j/j! to the order."""
-        return _rounded(sum(self._terms[1:], self._terms[0]))
-
-    @cached_property
-    def forcing(self) -> sp.Matrix:
-        """The integral of the transition over a step, by which a constant drift moves the states."""
-        T = exact(self.text.interval)
-        whole = sum((term * T / (j + 1) for j, term in enumerate(self._terms[:-1])), sp.zeros(len(self.x)))
-        return _rounded(whole + self._terms[-1] * T / (self.order + 1) if self.is_constant else whole)
-
-    @cached_property
-    def noise_factors(self) -> tuple[sp.Matrix, list[sp.Expr]]:
-        """Columns Gamma and weights W of the noise of a step, Q = Gamma diag(W) Gamma', positive semidefinite.
-
-        With M_j = F^j G T^j/j!, Q is the sum of M_i S M_j' T/(i + j + 1): Hilbert's matrix, as L D L'.
+        With M_j = F^j G T^j/j!, the noise is the sum of M_i S M_j' T/(i + j + 1): Hilbert's matrix, as L D L'.
         """
-        return self.factors_of([_product(term, self.G) for term in self._terms[: self.noise_terms]])
-
-    @property
-    def noise_terms(self) -> int:
-        """Powers of F in the noise of a step."""
-        return self.order + 1 if self.is_constant else self.order
-
-    def factors_of(self, moments: Sequence[sp.Matrix]) -> tuple[sp.Matrix, list[sp.Expr]]:
-        """Return `noise_factors` for the matrices M_j."""
-        lower, diagonal = _hilbert(len(moments))
-        T, columns, weights = exact(self.text.interval), [], []
-        for k in range(len(moments)):
-            block = sum((moments[i] * lower[i][k] for i in range(k, len(moments))), sp.zeros(*self.G.shape))
+        T, unit = exact(self.text.interval), sp.eye(len(self.x))
+        terms = [unit]
+        for j in range(1, self.order + 1):
+            terms.append(named(f"F{j}", multiply(terms[-1], F * T / j)))
+        moments = [multiply(term, G) for term in terms[: self.order + self.is_constant]]
+        size = len(moments)
+        lower, diagonal = sp.Matrix(size, size, lambda i, j: sp.Rational(1, i + j + 1)).LDLdecomposition(
+            False
+        )
+        columns, weights = [sp.zeros(len(self.x), 0)], []
+        for k in range(size):
+            block = sum((moments[i] * lower[i, k] for i in range(k, size)), sp.zeros(*G.shape))
             for column, density in enumerate(self.text.noise.values()):
                 if density and any(block[:, column]):
                     columns.append(block[:, column])
-                    weights.append(exact(density) * diagonal[k] * T)
-        return (sp.Matrix.hstack(*columns) if columns else sp.zeros(len(self.x), 0)), weights
+                    weights.append(exact(density) * diagonal[k, k] * T)
+        transition = named("Phi", sum(terms[1:], unit))
+        return Step(transition, terms, named("Gamma", sp.Matrix.hstack(*columns)), weights)
+
+    @cached_property
+    def _step(self) -> Step:
+        return self.discretized(self.F, self.G, lambda _, matrix: _rounded(matrix))
+
+    @property
+    def transition(self) -> sp.Matrix:
+        """Phi, the sum of F^j T^j/j! to the order."""
+        return self._step.transition
+
+    @cached_property
+    def forcing(self) -> sp.Matrix:
+        """The integral of a constant transition over a step, by which a constant drift moves the states."""
+        T = exact(self.text.interval)
+        return _rounded(
+            sum((term * T / (j + 1) for j, term in enumerate(self._step.terms)), sp.zeros(len(self.x)))
+        )
 
     @cached_property
     def Q(self) -> sp.Matrix:
         """Covariance of the noise of a step."""
-        gamma, weights = self.noise_factors
-        if not weights:
-            return sp.zeros(len(self.x))
-        Q = _rounded(_product(gamma * sp.diag(*weights), gamma.T))
+        gamma, weights = self._step.gamma, self._step.weights
+        Q = _rounded(multiply(gamma * sp.diag(*weights), gamma.T)) if weights else sp.zeros(len(self.x))
         if not self.is_constant:
             return Q
         # What is below the part that the series leaves out is none.
-        least = exact(_LEFT_OUT**2)
+        least = sp.Rational(1, 10**60)
         return sp.Matrix(*Q.shape, lambda i, j: Q[i, j] if Q[i, j] ** 2 > least * Q[i, i] * Q[j, j] else 0)
 
     @cached_property
     def observability(self) -> Observability:
-        """The rank of the observability matrix, and the combinations of states that no measurement shows."""
-        basis, known = self._unseen()
-        texts = tuple(self._combination(vector, known) for vector in basis)
-        return Observability(len(self.x) - len(basis), texts)
+        """The rank of the observability matrix, and the combinations of states that no measurement shows.
 
-    def _unseen(self) -> tuple[list[list[sp.Expr]], bool]:
-        """Return a basis of what no measurement shows, and whether its numbers hold for all inputs."""
-        F, H = self.F, self.H
-        symbols = sorted((F.free_symbols | H.free_symbols), key=str)
+        A full rank at general numbers of inputs and states is proved; combinations of few symbols are exact.
+        """
+        F, H, names = self.F, self.H, [one.name for one in self.text.states]
+        parts = (*F, *H)
+        symbols = sorted(F.free_symbols | H.free_symbols, key=str)
         calls = {
-            call
-            for part in (*F, *H)
-            for call in part.atoms(sp.Function) | {p for p in part.atoms(sp.Pow) if not p.exp.is_Integer}
+            call for part in parts for call in part.atoms(sp.Function, sp.Pow) if not call.is_polynomial()
         }
-        if symbols:
-            general = random.Random(1)
-            values = {symbol: sp.Rational(general.randint(-999, 999), 997) for symbol in symbols}
-            calls_at = {call: sp.Rational(general.randint(-999, 999), 991) for call in calls}
-            at = [part.xreplace(calls_at).xreplace(values) for part in (F, H)]
-            basis = unseen(*at)
-            few = len(self.x) <= _SYMBOLIC[0] and len(symbols) <= _SYMBOLIC[1] and not calls
-            return (unseen(F, H), True) if basis and few else (basis, not basis)
-        return unseen(F, H), True
-
-    def _combination(self, vector: Sequence[sp.Expr], known: bool) -> str:
-        """Return a combination of states as text; where its numbers depend on inputs, its states."""
-        names = [one.name for one in self.text.states]
-        if not known:
-            return ", ".join(name for name, part in zip(names, vector, strict=True) if part) + ", by inputs"
-        return combination(names, vector)
+        general = random.Random(1)
+        at = {
+            one: sp.Rational(general.randint(-999, 999), 997) for one in [*sorted(calls, key=str), *symbols]
+        }
+        basis = unseen(F.xreplace(at), H.xreplace(at))
+        if not basis or (len(names) <= _SYMBOLIC[0] and len(symbols) <= _SYMBOLIC[1] and not calls):
+            texts = [combination(names, vector) for vector in (unseen(F, H) if basis else [])]
+        else:
+            held = [[name for name, part in zip(names, vector, strict=True) if part] for vector in basis]
+            texts = (
+                [", ".join([*some, "by inputs"]) for some in held]
+                if symbols
+                else [combination(names, vector) for vector in basis]
+            )
+        return Observability(len(names) - len(basis), tuple(texts))
 
 
 def combination(names: Sequence[str], vector: Sequence[sp.Expr]) -> str:
@@ -327,40 +333,18 @@ def lasting(transition: sp.Matrix, basis: Sequence[Sequence[sp.Expr]], above: bo
     return False
 
 
-def _product(left: sp.Matrix, right: sp.Matrix) -> sp.Matrix:
-    """Return a product of matrices with few elements, most of them numbers."""
-    rows, columns = left.rows, right.cols
-    terms = [[k for k in range(left.cols) if left[i, k] != 0] for i in range(rows)]
-    return sp.Matrix(
-        rows, columns, lambda i, j: sp.Add(*(left[i, k] * right[k, j] for k in terms[i] if right[k, j] != 0))
-    )
+def dot(left: Iterable[sp.Expr], right: Iterable[sp.Expr]) -> sp.Expr:
+    """Return a scalar product, not multiplied out."""
+    return sp.Add(*(a * b for a, b in zip(left, right, strict=True) if a != 0 and b != 0))
+
+
+def multiply(left: sp.Matrix, right: sp.Matrix) -> sp.Matrix:
+    """Return a product of matrices, not multiplied out."""
+    return sp.Matrix(left.rows, right.cols, lambda i, j: dot(left[i, :], right[:, j]))
 
 
 def _rounded(matrix: sp.Matrix) -> sp.Matrix:
     """Return a matrix whose numbers of more than twice as many digits are rounded to `DIGITS`."""
-    return matrix.applyfunc(_short)
-
-
-def _short(number: sp.Expr) -> sp.Expr:
-    if not number.is_Rational or len(str(number.q)) <= 2 * DIGITS:
-        return number
-    return sp.Rational(str(sp.N(number, DIGITS)))
-
-
-def _hilbert(size: int) -> tuple[list[list[sp.Rational]], list[sp.Rational]]:
-    """Return L and D of Hilbert's matrix 1/(i + j + 1) = L D L', exactly.
-
-    >>> _hilbert(2)
-    ([[1, 0], [1/2, 1]], [1, 1/12])
-    """
-    lower = [[sp.S.Zero] * size for _ in range(size)]
-    diagonal: list[sp.Rational] = []
-    for j in range(size):
-        diagonal.append(
-            sp.Rational(1, 2 * j + 1) - sum((lower[j][k] ** 2 * diagonal[k] for k in range(j)), sp.S.Zero)
-        )
-        lower[j][j] = sp.S.One
-        for i in range(j + 1, size):
-            rest = sum((lower[i][k] * lower[j][k] * diagonal[k] for k in range(j)), sp.S.Zero)
-            lower[i][j] = (sp.Rational(1, i + j + 1) - rest) / diagonal[j]
-    return lower, diagonal
+    return matrix.applyfunc(
+        lambda x: sp.Rational(str(sp.N(x, DIGITS))) if x.is_Rational and len(str(x.q)) > 2 * DIGITS else x
+    )

@@ -96,6 +96,11 @@ def scheduled(model: FilterModel) -> Gains:
     """Return the gains of every step of the schedule."""
     text, context = model.text, _context()
     assert text.steps is not None
+    for one in text.measurements:
+        if one.every > text.steps:
+            raise InputError(
+                f"measurement[{one.name}].every is {one.every}; the schedule has {text.steps} steps"
+            )
     recursion = _Recursion(model, context.mpf)
     P = recursion.start()
     rows: dict[str, list[list[Fraction]]] = {one.name: [] for one in text.measurements}

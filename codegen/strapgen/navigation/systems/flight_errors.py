@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from fractions import Fraction
 from pathlib import Path
 from typing import ClassVar
@@ -23,9 +23,9 @@ from numpy.typing import NDArray
 from strapgen.cli.progress import track
 from strapgen.ir.exceptions import InputError
 from strapgen.lab.sensor_error_study import deviation_interval
-from strapgen.lab.sensor_errors.instruments import InstrumentErrors, TriadErrors
+from strapgen.lab.sensor_errors.instruments import InstrumentErrors
 from strapgen.lab.sensor_errors.measured_motions import measured
-from strapgen.lab.sensor_errors.sensor_covariance import single_constants
+from strapgen.lab.sensor_errors.sensor_covariance import single_units
 from strapgen.lab.sensor_errors.sensors import MeasurementUnit
 from strapgen.navigation.systems.system_flight import fly, local_axes
 from strapgen.navigation.systems.system_runner import SystemRunner
@@ -97,16 +97,9 @@ def spread(
         if cause in RANDOM:
             covariances[cause] = path.of_noise(alone)
         else:
-            singles = _singles(alone) if errors.drawn else []
+            singles = single_units(alone) if errors.drawn else []
             covariances[cause] = path.of_constants(singles, align)
     return Spread(path.times, covariances)
-
-
-def _singles(errors: InstrumentErrors) -> list[InstrumentErrors]:
-    """Return each constant of both triads alone."""
-    nothing = replace(errors, gyro=TriadErrors(), accelerometer=TriadErrors(), drawn=False)
-    gyros = [replace(nothing, gyro=one) for one in single_constants(errors.gyro)]
-    return gyros + [replace(nothing, accelerometer=one) for one in single_constants(errors.accelerometer)]
 
 
 def _cross(vectors: Array) -> Array:

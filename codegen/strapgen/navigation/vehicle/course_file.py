@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
-from strapgen.catalogue.toml_models import Key, UserFile
+from strapgen.catalogue.toml_models import Key, UserFile, check_kind
 from strapgen.ir.exceptions import InputError
 from strapgen.navigation.vehicle.legs import Legs
 from strapgen.navigation.vehicle.vehicle_motion import VehicleMotion
@@ -55,15 +55,7 @@ class Leg:
     rate_m_s: Annotated[float | None, Key("Largest climb rate", "m/s", above=0, most=1000)] = None
 
     def __post_init__(self) -> None:
-        needed, further = KINDS[self.kind]
-        stated = [name for name in self.__annotations__ if name != "kind" and getattr(self, name) is not None]
-        for name in needed:
-            if name not in stated:
-                raise InputError(f"a leg of kind {self.kind} needs {name}")
-        for name in stated:
-            if name not in (*needed, *further):
-                takes = ", ".join((*needed, *further)) or "no other key"
-                raise InputError(f"a leg of kind {self.kind} has no {name}; it takes {takes}")
+        check_kind(self, "a leg", KINDS)
         if self.bank_deg is not None and self.rate_deg_s is not None:
             raise InputError("a turn has bank_deg and rate_deg_s; one of them is needed")
 

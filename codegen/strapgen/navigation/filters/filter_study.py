@@ -1,12 +1,12 @@
-"""The Butterworth filter of second order before an output, and its responses on back ends, as a result and drawn."""
+"""The responses of a filter on back ends, as a result and drawn: that of a file, or the one before an output."""
 
 from __future__ import annotations
 
-import cmath
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
+from functools import cached_property
 from pathlib import Path
 from typing import ClassVar
 
@@ -14,8 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from strapgen import catalogue
+from strapgen.catalogue.methods.sensor_response import Response
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.fixed_settings import Settings
+from strapgen.ir.formats import float_above
+from strapgen.navigation.filters.filter_file import Filter
+from strapgen.navigation.filters.proof import ROOM, bounds
+from strapgen.navigation.filters.sections import LOWEST_EDGE, Cascade, Prototype, Section, low_pass
 from strapgen.results import figures
 from strapgen.results.records import INTERNAL
 from strapgen.results.result import Result
@@ -23,16 +28,9 @@ from strapgen.results.table import Column, TextTable
 from strapgen.run import backends as run
 from strapgen.run.evaluators import Evaluator
 
-#: Damping coefficient of the filter.
-_ROOT = math.sqrt(2)
-#: Part of a response at which its sum is cut off.
-_NEGLIGIBLE = 1e-16
-#: Edges for which the filter is run, as part of the sampling rate; a lower one takes too long to settle.
-LOWEST_EDGE = 1e-5
-
 
 @dataclass(frozen=True)
-class OutputFilter:
+class OutputFilter(Cascade):
     """A Butterworth filter of second order, sampled by the bilinear transformation with its edge kept.
 
     >>> edge = OutputFilter(3.2, 50)
@@ -56,79 +54,33 @@ class OutputFilter:
             )
 
     @property
-    def warped(self) -> float:
-        """K = tan(pi fc/fs), half the angle of the edge in a cycle, prewarped."""
-        return math.tan(math.pi * self.cutoff_hz / self.sample_hz)
+    def heading(self) -> str:
+        """The filter in words."""
+        return f"Butterworth filter of second order, {self.cutoff_hz:g} Hz, {self.sample_hz:g} samples in a second"
 
-    @property
+    @cached_property
+    def designs(self) -> tuple[Prototype, ...]:  # type: ignore[override]
+        """The one section."""
+        response = Response("butterworth", 2, Fraction(self.cutoff_hz))
+        return tuple(low_pass(response, Fraction(self.sample_hz)))
+
+    @cached_property
     def coefficients(self) -> dict[str, float]:
         """The coefficients of the kernel ``butterworth-2``, by the names of its inputs."""
-        K = self.warped
-        n = 1 + _ROOT * K + K**2
-        return {"loss": (_ROOT * K + K**2) / n, "coupling": K / n, "square": K**2 / n}
+        (design,) = self.designs
+        width = design.width or Fraction(0)
+        n = 1 + width + design.square
+        coupling = math.sqrt(design.square) / float(n)
+        return {"loss": float(1 - 1 / n), "coupling": coupling, "square": float(design.square / n)}
 
-    @property
-    def numerator(self) -> tuple[float, float, float]:
-        """Coefficients b of the transfer function in 1/z."""
-        b = self.coefficients["square"]
-        return b, 2 * b, b
+    @cached_property
+    def sections(self) -> tuple[Section, ...]:
+        """The section with the coefficients of the kernel, as exact as their decimals."""
+        loss, coupling, square = (Fraction(str(value)) for value in self.coefficients.values())
+        return (Section(square, coupling, loss, coupling),)
 
-    @property
-    def denominator(self) -> tuple[float, float, float]:
-        """Coefficients 1, a1, a2 of the transfer function in 1/z."""
-        K = self.warped
-        n = 1 + _ROOT * K + K**2
-        return 1.0, 2 * (K**2 - 1) / n, (1 - _ROOT * K + K**2) / n
 
-    @property
-    def transition(self) -> NDArray[np.float64]:
-        """How a cycle changes the states, (2, 2)."""
-        loss, coupling, square = self.coefficients.values()
-        return np.array([[1 - 2 * loss, -2 * coupling], [2 * coupling, 1 - 2 * square]])
-
-    @property
-    def settling(self) -> int:
-        """Cycles after which earlier samples no longer matter in double precision."""
-        return math.ceil(2 * math.log(_NEGLIGIBLE) / math.log(self.denominator[2]))
-
-    @property
-    def state_ranges(self) -> tuple[float, float]:
-        """Largest magnitude of the first and of the second state for samples up to 1: the sums of their responses."""
-        _, coupling, square = self.coefficients.values()
-        response, total = np.array([2 * coupling, 2 * square]), np.zeros(2)
-        for _ in range(self.settling):
-            total += np.abs(response)
-            response = self.transition @ response
-        return float(total[0]), float(total[1])
-
-    def accumulated(self, errors: tuple[float, float]) -> NDArray[np.float64]:
-        """Return the largest errors of both states in a run of any length whose cycles each add up to `errors`."""
-        power, total = np.eye(2), np.zeros((2, 2))
-        for _ in range(self.settling):
-            total += np.abs(power)
-            power = self.transition @ power
-        return np.asarray(total @ np.array(errors))
-
-    def analog(self, frequency_hz: float) -> complex:
-        """Return the response of the analog filter at a frequency."""
-        s = 1j * frequency_hz / self.cutoff_hz
-        return 1 / (s**2 + _ROOT * s + 1)
-
-    def digital(self, frequency_hz: float) -> complex:
-        """Return the response of the sampled filter at a frequency."""
-        late = cmath.exp(-2j * math.pi * frequency_hz / self.sample_hz)
-        top = sum(b * late**k for k, b in enumerate(self.numerator))
-        return top / sum(a * late**k for k, a in enumerate(self.denominator))
-
-    @property
-    def analog_delay_s(self) -> float:
-        """Delay of slow changes by the analog filter in s."""
-        return _ROOT / (2 * math.pi * self.cutoff_hz)
-
-    @property
-    def digital_delay_s(self) -> float:
-        """Delay of slow changes by the sampled filter in s."""
-        return _ROOT / (2 * self.warped * self.sample_hz)
+AnyFilter = OutputFilter | Filter
 
 
 def decibels(response: complex) -> float:
@@ -141,7 +93,8 @@ def decibels(response: complex) -> float:
 
 
 Array = NDArray[np.float64]
-KERNEL = "butterworth-2"
+#: Room that is tried above the ranges that exact arithmetic has, for what rounding adds.
+_ROOMS = (ROOM, Fraction(3, 2), Fraction(3))
 #: Largest sample that is run, as part of the range: sines and constants.
 _PART = 0.75
 #: Cycles at least in which a response is measured, and the most that a run may take.
@@ -184,9 +137,17 @@ def runs(names: Iterable[str]) -> list[tuple[str, str]]:
     ]
 
 
-def check_frequencies(output_filter: OutputFilter, frequencies: Sequence[float]) -> tuple[float, ...]:
+def usual_frequencies(one: AnyFilter) -> tuple[float, ...]:
+    """Return frequencies at which a filter is measured: of a file its corners, with half and twice of each."""
+    if isinstance(one, OutputFilter):
+        return (0.32, 1, 3.2, 8, 10, 20)
+    several = {design.hz * part for design in one.designs for part in (0.5, 1, 2)}
+    return tuple(sorted(hertz for hertz in several if hertz < one.sample_hz / 2))
+
+
+def check_frequencies(one: AnyFilter, frequencies: Sequence[float]) -> tuple[float, ...]:
     """Return frequencies that the samples can have."""
-    half = output_filter.sample_hz / 2
+    half = one.sample_hz / 2
     for frequency in frequencies:
         if not 0 < frequency < half:
             raise InputError(
@@ -194,7 +155,7 @@ def check_frequencies(output_filter: OutputFilter, frequencies: Sequence[float])
             )
     if not frequencies:
         raise InputError("no frequency is named; at least one is needed")
-    cycles = cycles_needed(output_filter, min(frequencies))
+    cycles = cycles_needed(one, min(frequencies))
     if cycles > _LONGEST:
         raise InputError(
             f"the filter or the lowest frequency takes {cycles} cycles to measure; at most {_LONGEST} are run"
@@ -202,14 +163,14 @@ def check_frequencies(output_filter: OutputFilter, frequencies: Sequence[float])
     return tuple(frequencies)
 
 
-def cycles_needed(output_filter: OutputFilter, lowest_hz: float) -> int:
+def cycles_needed(one: AnyFilter, lowest_hz: float) -> int:
     """Return the cycles of a run that settles twice, and then lasts three periods of the lowest frequency."""
-    return 2 * output_filter.settling + max(_SHORTEST, math.ceil(3 * output_filter.sample_hz / lowest_hz))
+    return 2 * one.settling + max(_SHORTEST, math.ceil(3 * one.sample_hz / lowest_hz))
 
 
 def measure(
     which: Iterable[tuple[str, str]],
-    output_filter: OutputFilter,
+    one: AnyFilter,
     largest: float,
     frequencies: Sequence[float],
 ) -> Iterator[Measured]:
@@ -218,70 +179,88 @@ def measure(
     `frequencies`: in Hz.
     """
     for name, carry in which:
-        evaluator = filter_evaluator(output_filter, largest, name, carry)
-        yield _measured(evaluator, name, carry, output_filter, largest, frequencies)
+        evaluator = filter_evaluator(one, largest, name, carry)
+        yield _measured(evaluator, name, carry, one, largest, frequencies)
 
 
-def filter_evaluator(output_filter: OutputFilter, largest: float, name: str, carry: str = "") -> Evaluator:
-    """Return the filter with its coefficients as constants, on a back end."""
-    chosen = catalogue.choose(KERNEL, constants=output_filter.coefficients)
-    entry = run.BACKENDS[name]
+def filter_evaluator(one: AnyFilter, largest: float, name: str, carry: str = "") -> Evaluator:
+    """Return the filter with its coefficients as constants, on a back end.
+
+    In fixed point the ranges of the states hold what exact arithmetic needs and what errors add up to; a word too short
+    for that is refused.
+    """
+    if isinstance(one, OutputFilter):
+        chosen = catalogue.choose("butterworth-2", constants=one.coefficients)
+    else:
+        chosen = catalogue.choose("filter", layout=one)
+    entry, proved = run.BACKENDS[name], bounds(one.sections)
     if not entry.fixed:
         return run.evaluator(chosen, name)
-    # A sixteenth above the ranges that exact arithmetic has, for what rounding adds.
-    first, second = (Fraction(largest * part * 17 / 16) for part in output_filter.state_ranges)
-    ranges = {"sample": Fraction(largest), "first": first, "second": second}
-    return run.evaluator(chosen, name, Settings(word=entry.word or 32, carry=carry, ranges=ranges))
+    word, size = entry.word or 32, Fraction(largest)
+    for room in _ROOMS:
+        ranges = {state: size * part * room for state, part in zip(one.states, proved.states, strict=True)}
+        settings = Settings(word=word, carry=carry, ranges={**ranges, "sample": size})
+        evaluator = run.evaluator(chosen, name, settings)
+        errors = proved.errors(call_errors(evaluator)[:-1])
+        needed = (size * part + error for part, error in zip(proved.states, errors, strict=True))
+        if all(most <= room for most, room in zip(needed, ranges.values(), strict=True)):
+            return evaluator
+    raise InputError(f"words of {word} bits are too short for the filter: errors may exceed twice its states")
+
+
+def call_errors(evaluator: Evaluator) -> list[Fraction]:
+    """Return by how much one call may be wrong in each state and in the output."""
+    return [max(argument.errors) for argument in evaluator.interface.outputs]
 
 
 def _measured(
     evaluator: Evaluator,
     name: str,
     carry: str,
-    output_filter: OutputFilter,
+    one: AnyFilter,
     largest: float,
     frequencies: Sequence[float],
 ) -> Measured:
     """Run sines, a constant, and a constant that becomes zero, side by side."""
-    start = 2 * output_filter.settling
-    cycles = cycles_needed(output_filter, min(frequencies))
-    samples = _samples(output_filter, _PART * largest, frequencies, cycles)
+    start = 2 * one.settling
+    cycles = cycles_needed(one, min(frequencies))
+    samples = _samples(one, _PART * largest, frequencies, cycles)
     outputs = run_filter(evaluator, samples)
-    angles = np.asarray(2 * math.pi * np.arange(start, cycles) / output_filter.sample_hz, np.float64)
+    angles = np.asarray(2 * math.pi * np.arange(start, cycles) / float(one.sample_hz), np.float64)
     responses = tuple(
         complex(np.mean(_phasors(outputs[start:, k], angles * f) / _phasors(samples[start:, k], angles * f)))
         for k, f in enumerate(frequencies)
     )
     count = len(frequencies)
     last = outputs[start:]
-    constant = float(np.abs(last[:, count] - samples[-1, count]).max())
+    settled = float(math.prod(part.low for part in one.sections)) * samples[-1, count]
+    constant = float(np.abs(last[:, count] - settled).max())
     rest = float(np.abs(last[:, count + 1]).max())
     gains = [_finite(decibels(response)) for response in responses]
     phases = [math.atan2(response.imag, response.real) for response in responses]
     bound, unit = None, None
     if evaluator.sources.fixed is not None:
         unit = float(evaluator.interface.outputs[-1].unit)
-        bound = certified_bound(evaluator, output_filter)
+        bound = certified_bound(evaluator, one)
     return Measured(responses, name, carry or None, gains, phases, constant, rest, bound, unit)
 
 
-def certified_bound(evaluator: Evaluator, output_filter: OutputFilter) -> float:
+def certified_bound(evaluator: Evaluator, one: AnyFilter) -> float:
     """Return by how much the output in fixed point may differ from that of exact arithmetic, in a run of any length.
 
-    What a call adds to the errors of the states dies out as the filter forgets, and the sum of that is finite.
+    What a call adds to the errors of the states dies out as the filter forgets, and the sum of that is finite. No limit
+    cycle is larger, since exact arithmetic has none.
     """
-    errors = [float(max(argument.errors)) for argument in evaluator.interface.outputs]
-    first, second = output_filter.accumulated((errors[0], errors[1]))
-    coefficients = output_filter.coefficients
-    return float(coefficients["coupling"] * first + (1 - coefficients["square"]) * second + errors[2])
+    *states, output = call_errors(evaluator)
+    return float_above(bounds(one.sections).output_error(states, output))
 
 
-def _samples(output_filter: OutputFilter, size: float, frequencies: Sequence[float], cycles: int) -> Array:
+def _samples(one: AnyFilter, size: float, frequencies: Sequence[float], cycles: int) -> Array:
     """Return samples (cycles, frequencies and 2, 3): sines, a constant, and one that ends once it has settled."""
-    times = np.arange(cycles) / output_filter.sample_hz
+    times = np.arange(cycles) / float(one.sample_hz)
     phases = 2 * np.pi * (np.multiply.outer(times, frequencies)[..., None] + np.arange(3) / 3)
     constant = np.broadcast_to(size * np.array([1.0, 0.371, -0.7377]), (cycles, 1, 3))
-    ending = constant * (np.arange(cycles) < output_filter.settling)[:, None, None]
+    ending = constant * (np.arange(cycles) < one.settling)[:, None, None]
     return np.concatenate([size * np.sin(phases), constant, ending], axis=1)
 
 
@@ -292,7 +271,7 @@ def run_filter(evaluator: Evaluator, samples: Array) -> Array:
     """
     outputs = np.empty(samples.shape)
     rows = evaluator.stored(-1, samples.reshape(-1, 3)).reshape(samples.shape)
-    states = [np.zeros(samples.shape[1:], evaluator.number)] * 2
+    states = [np.zeros(samples.shape[1:], evaluator.number)] * (len(evaluator.function.inputs) - 1)
     feedback = evaluator.fresh(samples.shape[1])
     for number, row in enumerate(rows):
         (*states, filtered), feedback = evaluator.run([*states, row], feedback)
@@ -329,20 +308,22 @@ class KnownResponse:
 class FilterResult(Result):
     """The responses of an output's filter: analog, digital and measured."""
 
-    drawn_by: ClassVar[str] = f"{__name__}:output_filter_image"
+    drawn_by: ClassVar[str] = f"{__name__}:filter_image"
 
-    output_filter: OutputFilter = field(metadata=INTERNAL)
+    filter: AnyFilter = field(metadata=INTERNAL)
     #: Largest magnitude of a sample
     largest: float = field(metadata=INTERNAL)
-    cutoff_hz: float
+    cutoff_hz: float | None
     sample_hz: float
+    #: Name in the file; None of the one before an output
+    name: str | None
     #: Coefficients of the kernel by name
     coefficients: Mapping[str, float]
     numerator: tuple[float, ...]
     denominator: tuple[float, ...]
-    #: Delay of slow changes
-    analog_delay_s: float
-    digital_delay_s: float
+    #: Delay of slow changes; None where none pass
+    analog_delay_s: float | None
+    digital_delay_s: float | None
     #: Largest magnitudes of the states
     state_ranges: list[float]
     responses: list[KnownResponse]
@@ -350,17 +331,23 @@ class FilterResult(Result):
 
     @staticmethod
     def of(
-        edge: OutputFilter, largest: float, frequencies: Sequence[float], measured: list[Measured]
+        one: AnyFilter, largest: float, frequencies: Sequence[float], measured: list[Measured]
     ) -> FilterResult:
         """Return the responses of a filter for samples up to a size, at frequencies in Hz."""
-        same = ("cutoff_hz", "sample_hz", "coefficients", "numerator", "denominator", "analog_delay_s")
         return FilterResult(
-            output_filter=edge,
+            filter=one,
             largest=largest,
-            **{name: getattr(edge, name) for name in (*same, "digital_delay_s")},
-            state_ranges=[largest * part for part in edge.state_ranges],
+            cutoff_hz=one.cutoff_hz if isinstance(one, OutputFilter) else None,
+            sample_hz=float(one.sample_hz),
+            name=None if isinstance(one, OutputFilter) else one.title,
+            coefficients=one.coefficients,
+            numerator=one.numerator,
+            denominator=one.denominator,
+            analog_delay_s=_finite(one.analog_delay_s),
+            digital_delay_s=_finite(one.digital_delay_s),
+            state_ranges=[float_above(Fraction(largest) * part) for part in bounds(one.sections).states],
             responses=[
-                KnownResponse(f, _finite(decibels(edge.analog(f))), _finite(decibels(edge.digital(f))))
+                KnownResponse(f, _finite(decibels(one.analog(f))), _finite(decibels(one.digital(f))))
                 for f in frequencies
             ],
             measured=measured,
@@ -376,7 +363,7 @@ class FilterResult(Result):
         columns += [Column(one.label, spec=_DB) for one in self.measured]
         rows = []
         for number, frequency in enumerate(self.rows()):
-            known = (self.output_filter.analog(frequency), self.output_filter.digital(frequency))
+            known = (self.filter.analog(frequency), self.filter.digital(frequency))
             responses = (*known, *(one.responses[number] for one in self.measured))
             rows.append([frequency, *map(decibels, responses)])
         return TextTable(columns, rows)
@@ -386,14 +373,15 @@ class FilterResult(Result):
         return "\n".join(_lines(self))
 
 
-def output_filter_image(result: FilterResult, path: str | Path) -> bytes:
+def filter_image(result: FilterResult, path: str | Path) -> bytes:
     """Return the responses over frequency: analog and digital as lines, measured ones as points."""
-    edge, frequencies = result.output_filter, result.rows()
+    one, frequencies = result.filter, result.rows()
     figure, grid = figures.grid_of_axes(1, 1, (8.5, 4.4))
     axes = grid[0, 0]
-    low = min(edge.cutoff_hz, *frequencies) / 3
-    line = np.geomspace(low, 0.999 * edge.sample_hz / 2, 400)
-    for name, response, style in (("analog", edge.analog, "--"), ("digital", edge.digital, "-")):
+    corners = [design.hz for design in one.designs]
+    line = np.geomspace(min(*corners, *frequencies) / 3, 0.999 * float(one.sample_hz) / 2, 400)
+    line = np.sort(np.append(line, [hertz for hertz in corners if hertz < line[-1]]))
+    for name, response, style in (("analog", one.analog, "--"), ("digital", one.digital, "-")):
         axes.plot(line, [decibels(response(f)) for f in line], style, color="0.35", linewidth=1.2, label=name)
     for number, measured in enumerate(result.measured):
         gains = [decibels(response) for response in measured.responses]
@@ -405,29 +393,32 @@ def output_filter_image(result: FilterResult, path: str | Path) -> bytes:
             label=measured.label,
         )
     axes.set_xscale("log")
-    lowest = min(decibels(edge.digital(f)) for f in (*frequencies, edge.cutoff_hz))
-    axes.set_ylim(max(-120, lowest) - 10, 5)
+    known = [decibels(one.digital(f)) for f in (*line[line <= max(*corners, *frequencies)], *frequencies)]
+    axes.set_ylim(max(-120, min(known)) - 10, max(0, *known) + 5)
     axes.set_xlabel("frequency, Hz")
     axes.set_ylabel("gain, dB")
     figures.style(axes)
     figures.common_legend(figure, [axes], loc="outside right center")
-    figures.title(
-        figure, f"Butterworth filter of second order, {edge.cutoff_hz:g} Hz at {edge.sample_hz:g} Hz"
-    )
+    figures.title(figure, one.heading)
     return figures.image(figure, path)
 
 
 def _lines(result: FilterResult) -> Iterator[str]:
-    edge = result.output_filter
-    yield f"Butterworth filter of second order, {edge.cutoff_hz:g} Hz, {edge.sample_hz:g} samples in a second"
-    names = [f"{name} {value:.10f}" for name, value in edge.coefficients.items()]
+    one = result.filter
+    yield one.heading
+    names = [f"{name} {value:.10f}" for name, value in one.coefficients.items()]
     yield f"coefficients of the kernel: {', '.join(names)}"
-    _, a1, a2 = edge.denominator
-    yield f"b0 {edge.numerator[0]:.10f}, a1 {a1:.10f}, a2 {a2:.10f}"
-    analog, digital = 1e3 * edge.analog_delay_s, 1e3 * edge.digital_delay_s
-    yield f"delay of slow changes: analog {analog:.4f} ms, digital {digital:.4f} ms"
-    first, second = result.state_ranges
-    yield f"ranges for samples up to {result.largest:g}: first {first:.6g}, second {second:.6g}"
+    if isinstance(one, OutputFilter):
+        _, a1, a2 = one.denominator
+        yield f"b0 {one.numerator[0]:.10f}, a1 {a1:.10f}, a2 {a2:.10f}"
+    else:
+        for letter, values in (("b", one.numerator), ("a", one.denominator)):
+            yield f"{letter}: {', '.join(f'{value:.10g}' for value in values)}"
+    if result.digital_delay_s is not None:
+        analog, digital = 1e3 * one.analog_delay_s, 1e3 * one.digital_delay_s
+        yield f"delay of slow changes: analog {analog:.4f} ms, digital {digital:.4f} ms"
+    names = [f"{name} {size:.6g}" for name, size in zip(one.states, result.state_ranges, strict=True)]
+    yield f"ranges for samples up to {result.largest:g}: {', '.join(names)}"
     yield from ["", *result.table().lines(), ""]
     yield "errors of a constant input and of none, once settled, and the bound of a run of any length"
     columns = [

@@ -1,0 +1,1 @@
+"""Filters of signals: designs from files, kernels, proofs for fixed point, and the study of their responses."""
