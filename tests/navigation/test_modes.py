@@ -111,8 +111,11 @@ def test_modes_and_times_are_exact_in_fixed_point(word):
     assert not any(quantized(choose("mode-sequence"), Settings(word=word)).error_bounds.values())
 
 
-def test_a_switch_changes_at_its_thresholds_and_rests_between_them():
-    switch = strapgen.evaluator("hysteresis")
+@pytest.mark.parametrize(
+    "backend", ["numpy", *(pytest.param(b, marks=pytest.mark.long) for b in ("c", "rust"))]
+)
+def test_a_switch_changes_at_its_thresholds_and_rests_between_them(backend):
+    switch = strapgen.evaluator("hysteresis", backend)
     state, states = 0.0, []
     for value in (0, 3, 4.9, 5, 4, 3, 2.9, 4.9, 9, 3):
         state = float(switch(state, value, 3, 5))

@@ -7,10 +7,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 import sympy as sp
+from tests.commands import says
 
 import strapgen
 from strapgen import pipeline
 from strapgen.catalogue import choose
+from strapgen.firmware import verify_files
 from strapgen.ir.exceptions import InputError
 from strapgen.navigation.preintegration import INPUTS, INTERPOLATION, preintegration_sources, resampling
 from strapgen.navigation.preintegration.preintegrator import (
@@ -470,3 +472,24 @@ def test_strict_compilers_are_silent(tmp_path, compiler, kind):
         [*compiler, *STRICT, "main.cpp"], cwd=tmp_path, capture_output=True, text=True, check=False
     )
     assert done.returncode == 0, done.stderr
+
+
+def test_a_header_is_verified_by_its_command(tmp_path, capsys):
+    assert (
+        says(["preintegrate", "--window", "pair-1-5", "--name", "imu", "--out", str(tmp_path)], capsys)[0]
+        == 0
+    )
+    path = tmp_path / "imu.hpp"
+    for place in (path, tmp_path):
+        status, said, _ = says(["verify", str(place)], capsys)
+        assert (status, said) == (0, f"{path}: 1 file, in step with the command\n")
+    text = path.read_text()
+    path.write_text(text.replace("if (end <= begin)", "if (end < begin)", 1))
+    number = text[: text.index("if (end <= begin)")].count("\n") + 1
+    status, said, _ = says(["verify", str(path)], capsys)
+    assert status == 1
+    assert f"{path}:{number}: edited: if (end < begin); generated: if (end <= begin)" in said
+    assert verify_files.main([str(tmp_path)]) == 1
+    path.write_text(text.replace("strapgen preintegrate", "sh -c touch", 1))
+    status, _, error = says(["verify", str(path)], capsys)
+    assert (status, error.count("\n")) == (2, 1) and "imu.hpp is no C file" in error

@@ -31,10 +31,10 @@ def _by_mode(number: sp.Symbol, *values: sp.Expr | int) -> sp.Expr:
 def hysteresis() -> Kernel:
     """Return a switch with two thresholds: on from the upper one, off below the lower one, and as it was between them.
 
-    Returns: inputs ``switch``, a state, ``value``, ``lower`` and ``upper``, in one unit; output ``next_switch``.
+    Returns: inputs ``is_on``, a state, ``value``, ``lower`` and ``upper``, in one unit; output ``next_is_on``.
     """
     build = KernelBuilder()
-    state = _flag("switch", "whether the switch is on")
+    state = _flag("is_on", "whether the switch is on")
     before = build.scalar(state)
     value, lower, upper = (
         build.scalar(Signal.scalar(name, unit=ANY, meaning=meaning))
