@@ -221,7 +221,7 @@ def test_the_drifts_in_the_readme_are_those_of_its_command(capsys, monkeypatch):
     monkeypatch.chdir(ROOT)
     rows = json.loads(run(f"{readme_command('strapgen frontier')} --format json", capsys))["algorithms"]
     ours, published = sorted(rows, key=lambda row: row["drift_deg_h"]["cone"])
-    assert "Ignagni" in published["source"] and ours["algorithm"].startswith("window-7-7")
+    assert "Ignagni" in published["source"] and ours["algorithm"].startswith("pair-1-8")
     cells = [
         rf"{row['drift_deg_h']['cone']:.2g} °/h, .* {row['multiply_per_sample']:.0f} multiplications a sample"
         for row in (ours, published)
@@ -232,6 +232,7 @@ def test_the_drifts_in_the_readme_are_those_of_its_command(capsys, monkeypatch):
 #: Pictures of the pages that a command on a page draws, by what its file of that command is called.
 DRAWN = {
     "cone-drift": "README",
+    "frontier-sensors": "design",
     "orders": "paths/paper",
     "bounds": "paths/firmware",
     "word-length": "fixed-point",
@@ -395,6 +396,7 @@ LESS = {
     "guidance.toml --method coning-combined,rk4": "guidance.toml --method coning-combined:3,rk4:2",
     "--method rk4 --cluster local:2": "--method rk4:2 --cluster local:1",
     "--length 200 --cluster local:2": "--length 200 --cluster local:1",
+    "coning-compressed,coning-combined,coning-least-squares,coning-shaped-8,pair-2-7": "pair-2-7",
     "--method rk1,rk2,rk4,butcher6,cooper-verner8": "--method rk1,rk2,butcher6",
     "--word 8,10,12,14,16,18,20,24,28,32": "--word 8,10,32",
     "--word 12,16,20,24,28,32": "--word 12,32",

@@ -101,7 +101,9 @@ SECTIONS = (
         "Navigation",
         "docs/two-speed.md",
         "You follow NATO's lectures on strapdown systems, AGARD 133 of 1984, up to a whole navigator in C.",
-        _docs("navigation", "preintegration", "compensation", "ahrs", "systems", "kalman", "flights"),
+        _docs(
+            "navigation", "filters", "preintegration", "compensation", "ahrs", "systems", "kalman", "flights"
+        ),
     ),
     Section(
         "Reference",

@@ -243,32 +243,23 @@ def wind(model: Any, case: Case) -> Flight:
     return Flight(model.text.title, tuple(model.states), time[1:], errors, run.covariances[:, 1:])
 
 
-@dataclass
-class Limited:
-    """Hysteresis of the feedback: above one innovation the height alone is corrected, until it is below the other."""
+@dataclass(frozen=True)
+class Limits:
+    """Innovations in m above which the height alone is corrected, and up to which all is again."""
 
     above: float = 30.0
     below: float = 5.0
-    active: Any = False
-
-    def __call__(self, before: Array, after: Array, innovation: Array) -> Array:
-        """Return the states after a measurement, of those before it and after all feedback."""
-        size = np.abs(innovation)
-        self.active = np.where(
-            np.isnan(size), self.active, size > np.where(self.active, self.below, self.above)
-        )
-        held = np.where(self.active[:, None], before, after)
-        return np.concatenate([after[:, :1], held[:, 1:]], axis=-1)
 
 
-def baro_inertial(model: Any, case: Case, limited: Limited | None = None) -> Flight:
+def baro_inertial(model: Any, case: Case, limits: Limits = Limits()) -> Flight:
     """Fly a climb, without the barometer from 200 s to 260 s and on another one, 80 m higher, from 400 s on.
 
     The error of the height is that from the barometer in use.
     """
     motion, runs, steps = motions.named("climb", {}), case.runs, 2400
-    limited, interval = limited or Limited(), float(model.text.interval)
-    stepper, time = model.on(case.backend), interval * np.arange(steps + 1)
+    interval, limited = float(model.text.interval), np.zeros(runs)
+    stepper, switch = model.on(case.backend), strapgen.evaluator("height-hysteresis", case.backend)
+    time = interval * np.arange(steps + 1)
     height, climb = motion.height(time), motion.velocity(time)[:, 2]
     gradient = 2 * 9.80665 / 6378137
     acceleration = np.diff(climb) / interval - gradient * (height[1:] + height[:-1]) / 2
@@ -284,7 +275,9 @@ def baro_inertial(model: Any, case: Case, limited: Limited | None = None) -> Fli
         if k not in lost:
             seen = case.noisy(np.full(runs, source[k]), 3)
             after, _, innovation, _ = stepper.update("barometer", state, covariance, seen)
-            state = limited(state, after, innovation)
+            limited = np.reshape(switch(limited, innovation, limits.above, limits.below), runs)
+            state[:, 0] = after[:, 0]
+            state = np.where(limited[:, None] > 0, state, after)
         bias = bias + 2e-4 * np.sqrt(interval) * case.normal(runs)
         errors.append(state - np.stack(np.broadcast_arrays(source[k], climb[k], bias), axis=-1))
     covariances = fixed_gain(model, steps, lost)[None, 1:]
@@ -365,7 +358,10 @@ def main() -> None:
     parser.add_argument("--backend", default="c")
     parser.add_argument("--plot", type=Path)
     options = parser.parse_args()
-    flight = fly(options.name, Case(options.runs, options.backend))
+    try:
+        flight = fly(options.name, Case(options.runs, options.backend))
+    except strapgen.InputError as error:
+        parser.error(str(error))
     inside = np.mean(np.abs(flight.errors) < QUANTILE * flight.deviations, axis=(0, 1))
     print(
         f"{flight.title}, {options.runs} runs: errors at the end, deviation by the filter, share in the band of 95 %"

@@ -242,7 +242,7 @@ def test_a_class_and_every_example_run(in_folder):
             f"simulate euler {MOTION} --step 0.02 --record 1 --specific-force 0,0,9.81 --errors {name}",
         )
         assert "errors" in text
-    assert len([*(EXAMPLES / "sensors").glob("*.toml")]) == 10
+    assert len([*(EXAMPLES / "sensors").glob("*.toml")]) == 11
 
 
 def test_fixed_point_takes_formats_that_hold_the_errors(in_folder):

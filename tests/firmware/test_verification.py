@@ -271,6 +271,7 @@ MALICIOUS = {
     "strapgen system pipe": "no regular file",
     "strapgen two-speed dcm --out victim": "--out",
     "strapgen window generate pipe": "no regular file",
+    "strapgen preintegrate --window pipe": "no regular file",
     "strapgen window design --out victim.toml": "none that generates C",
     "sh -c 'touch victim'": "does not say by which command",
     "strapgen generate euler; touch victim": "states algorithm 3 times",

@@ -15,6 +15,7 @@ from commands import run
 from derived import kernel
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from languages import cases
 
 import strapgen
 from strapgen.catalogue import Choice
@@ -27,6 +28,7 @@ from strapgen.navigation.filters.filter_file import Filter, read
 from strapgen.navigation.filters.filter_study import OutputFilter, decibels
 from strapgen.navigation.filters.proof import bounds, cycle
 from strapgen.navigation.filters.sections import Section
+from strapgen.run.backends import BACKENDS
 
 FILES = Path(__file__).resolve().parents[2] / "examples" / "filters"
 #: The filters of the MFCRS: the frequency at which the gain in dB is printed, both None where none is.
@@ -267,6 +269,43 @@ def test_stability_is_decided_exactly():
             Section(Fraction(square)).require_stable()
 
 
+@pytest.mark.parametrize(
+    ("sections_of", "said"),
+    [
+        ("", "section is missing; a list of 1 to 8 tables is needed"),
+        ("section = []", "section has 0 entries; from 1 to 8 are needed"),
+        ("[section]\nkind = 'lag'", "section is a table; a list of 1 to 8 tables is needed"),
+    ],
+)
+def test_a_filter_has_sections(sections_of, said, tmp_path):
+    path = tmp_path / "none.toml"
+    path.write_text(f"name = 'None'\nsource = 'a test'\nsample_hz = 50\n{sections_of}\n")
+    with pytest.raises(InputError, match=said):
+        read(path)
+
+
+@pytest.mark.parametrize(
+    "section",
+    [
+        'kind = "poles"\npoles = [[0, 0], [0, 0], [0, 0]]\nzeros = [[-1, 0]]',
+        'kind = "poles"\npoles = [[0.5, 0.3], [0.2, 0.1]]\nzeros = [[1, 0], [-1, 0]]',
+        'kind = "lead-lag"\nfrequency_hz = 5\ngain_db = -40\norder = 2',
+        'kind = "butterworth"\norder = 3\nfrequency_hz = 24',
+        'kind = "second-order"\nfrequency_hz = 5\ndamping = 10',
+        'kind = "lag"\ntime_constant_s = 10',
+    ],
+)
+def test_sections_at_their_limits_run_within_their_bounds(section, tmp_path, rng):
+    one = written(tmp_path, section)
+    samples = np.rint(rng.uniform(-1, 1, (300, 1, 3)) * 2**14) / 2**14
+    exact = experiment.run_filter(experiment.filter_evaluator(one, 1.0, "numpy"), samples)
+    expected = independent.lfilter(one.numerator, one.denominator, samples, axis=0)
+    np.testing.assert_allclose(exact, expected, atol=1e-9)
+    fixed = experiment.filter_evaluator(one, 1.0, "c-fixed16", "none")
+    apart = np.abs(experiment.run_filter(fixed, samples) - exact).max()
+    assert 0 < apart <= experiment.certified_bound(fixed, one) + 1e-12
+
+
 # Kernels
 
 
@@ -298,6 +337,21 @@ def test_words_of_16_bits_hold_every_coefficient(name):
         if term.coefficient is not None and term.coefficient.value * 2**term.coefficient.fraction % 1
     ]
     assert rounded == []
+
+
+@pytest.mark.parametrize("backend", cases(BACKENDS))
+def test_a_filter_runs_alike_on_every_back_end(backend, rng):
+    one, entry = described("cascade"), BACKENDS[backend]
+    samples = rng.uniform(-16, 16, (12, 2, 3))
+    reference = f"c-fixed{entry.word or 32}" if entry.fixed else "numpy"
+    found, expected = (
+        experiment.run_filter(experiment.filter_evaluator(one, 16.0, name, "all"), samples)
+        for name in (backend, reference)
+    )
+    if entry.fixed:
+        assert np.array_equal(found, expected)
+    else:
+        np.testing.assert_allclose(found, expected, atol=1e-4 if "float" in backend else 1e-12)
 
 
 # Proofs

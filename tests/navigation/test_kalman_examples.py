@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import sys
 from functools import cache
 from pathlib import Path
@@ -14,11 +15,12 @@ from scipy.stats import chi2
 import strapgen
 from strapgen.lab.sensor_errors.instruments import InstrumentErrors, TriadErrors
 
-FOLDER = Path(__file__).resolve().parents[2] / "examples" / "kalman"
+DOCS = Path(__file__).resolve().parents[2] / "docs"
+FOLDER = DOCS.parent / "examples" / "kalman"
 sys.path.insert(0, str(FOLDER))
 
 import flights  # noqa: E402
-from flights import Case, Flight, Limited, fly  # noqa: E402
+from flights import Case, Flight, Limits, fly  # noqa: E402
 
 #: Steps of the comparison with a dense filter; a drop-out of every measurement lies in them.
 STEPS = 24
@@ -95,6 +97,22 @@ def test_another_filter_is_seen(fault):
     assert differences("wind", dense, "ud") > 1e-10
 
 
+def test_a_run_that_loses_measurements_does_not_touch_another():
+    dense = FILTERS["wind"]()
+    measurements, inputs, first = signals(dense)
+    several = {name: np.stack([value, value]) for name, value in measurements.items()}
+    for values in several.values():
+        values[1, 9:13] = np.nan
+    both = model("wind").run(several, inputs, initial=first)
+    for row in range(2):
+        alone = model("wind").run(
+            {name: value[row] for name, value in several.items()}, inputs, initial=first
+        )
+        np.testing.assert_array_equal(both.states[row], alone.states)
+        np.testing.assert_array_equal(both.covariances[row], alone.covariances)
+    assert np.abs(both.states[0] - both.states[1]).max() > 0.1
+
+
 def test_the_gains_of_the_vertical_channel_solve_the_riccati_equation():
     dense = FILTERS["baro-inertial"]()
     gain, _ = dense.steady()
@@ -126,8 +144,10 @@ def assert_consistent(flight: Flight, times: slice = slice(None)) -> None:
 def test_two_hundred_flights_with_satellites_are_as_wrong_as_the_filter_says():
     flight = fly("gnss", Case(200))
     assert_consistent(flight)
-    low, high = nees_band(15, 200)
-    assert low < flight.nees[:, -1].mean() < high
+    (low, high), mean = nees_band(15, 200), flight.nees[:, -1].mean()
+    assert low < mean < high
+    said = f"squared error is {mean:.1f} at the end; 95 % of such means lie between {low:.1f} and {high:.1f}."
+    assert said in " ".join((DOCS / "kalman.md").read_text().split())
     assert (flight.deviations[0, -1, :3] < np.degrees(2e-3)).all()
 
 
@@ -195,7 +215,7 @@ def test_alignments_are_as_wrong_as_the_schedule_says():
 @cache
 def vertical(above: float = 30.0) -> Flight:
     """Return a flight without a barometer from 200 s to 260 s, and with another one from 400 s on."""
-    return flights.baro_inertial(model("baro-inertial"), Case(100), Limited(above, min(above, 5.0)))
+    return flights.baro_inertial(model("baro-inertial"), Case(100), Limits(above, 5.0))
 
 
 def test_without_a_barometer_the_loop_coasts():
@@ -212,23 +232,22 @@ def test_without_a_barometer_the_loop_coasts():
 
 def test_after_a_step_hysteresis_keeps_the_climb():
     climbs = {}
-    for above in (30.0, np.inf):
+    for above in (30.0, 1e4):
         flight = vertical(above)
         step = flight.time > 400
         climbs[above] = np.abs(flight.errors[:, step, 1]).max()
         assert (np.abs(flight.errors[:, -1, 0]) < 5 * flight.deviations[0, -1, 0]).all()
-    assert climbs[30.0] < 0.2 * climbs[np.inf]
+    assert climbs[30.0] < 0.2 * climbs[1e4]
 
 
-def test_hysteresis_switches_at_its_two_sizes():
-    limited, before, after = Limited(30, 5), np.zeros((2, 3)), np.ones((2, 3))
+@pytest.mark.parametrize("backend", ["numpy", "c", "c-fixed32"])
+def test_hysteresis_switches_at_its_two_limits(backend):
+    switch, limited = strapgen.evaluator("height-hysteresis", backend), np.zeros(2)
     found = []
-    for innovation in ([0, -31], [29, 20], [31, np.nan], [-6, 4], [4.9, 29]):
-        states = limited(before, after, np.array(innovation, float))
-        assert (states[:, 0] == 1).all()
-        assert (states[:, 1] == states[:, 2]).all()
-        found.append((1 - states[:, 1]).tolist())
-    assert found == [[0, 1], [0, 1], [1, 1], [1, 0], [0, 0]]
+    for error in ([0, -31], [29, 20], [30, -5.5], [31, 5], [-6, 29], [4.9, -30.5]):
+        limited = np.reshape(switch(limited, np.array(error, float), 30, 5), 2)
+        found.append(limited.tolist())
+    assert found == [[0, 1], [0, 1], [0, 1], [1, 0], [1, 0], [0, 1]]
 
 
 @pytest.mark.parametrize("name", ["wind", "baro-inertial"])
@@ -242,6 +261,22 @@ def test_in_words_of_32_bits_it_flies_as_in_double(name):
     one, other = (fly(name, Case(2, backend)) for backend in ("c", "c-fixed32"))
     difference = np.abs(one.errors - other.errors) / one.deviations
     assert 0 < difference.max() < 0.02
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("name", flights.FLIGHTS)
+def test_pictures_of_the_page_are_those_of_the_script(name, tmp_path, monkeypatch):
+    """If this fails, run python examples/kalman/flights.py NAME --plot docs/kalman-NAME.svg."""
+    drawn = tmp_path / f"kalman-{name}.svg"
+    monkeypatch.setattr("sys.argv", ["flights.py", name, "--plot", str(drawn)])
+    flights.main()
+    number = r"-?\d+(?:\.\d+)?(?:e-?\d+)?"
+    texts = [
+        re.sub(r'(?:url\(#|id=")p[0-9a-f]{10}', "", path.read_text()) for path in (drawn, DOCS / drawn.name)
+    ]
+    ours, theirs = (np.array(re.findall(number, text), float) for text in texts)
+    assert re.sub(number, "#", texts[0]) == re.sub(number, "#", texts[1])
+    np.testing.assert_allclose(ours, theirs, rtol=0, atol=0.5)
 
 
 def test_the_script_flies_and_draws(tmp_path, monkeypatch, capsys):

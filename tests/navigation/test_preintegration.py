@@ -7,12 +7,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 import sympy as sp
+from tests.commands import says
 
 import strapgen
 from strapgen import pipeline
 from strapgen.catalogue import choose
+from strapgen.firmware import verify_files
 from strapgen.ir.exceptions import InputError
-from strapgen.navigation.preintegration import INPUTS, preintegration_sources
+from strapgen.navigation.preintegration import INPUTS, INTERPOLATION, preintegration_sources, resampling
 from strapgen.navigation.preintegration.preintegrator import (
     PreintegrationError,
     PreintegrationStatus,
@@ -76,6 +78,27 @@ def test_errors_over_half_a_second(name, jitter, limits):
 def test_instants_between_jittering_samples(kind):
     found = errors("pair-1-8", QUADCOPTER, 0.02, kind, any_instant=True, count=10)
     assert all(error < limit for error, limit in zip(found, (3e-8, 3e-7, 2e-7), strict=True)), found
+
+
+@pytest.mark.parametrize(("size", "degree"), [(40, 5), (4, 3), (2, 1)])
+def test_polynomials_of_time_are_integrated_exactly(size, degree):
+    """Through as many samples as there are: six at the ends, fewer where there are no more."""
+    times = np.arange(size) + 0.1 * np.sin(np.arange(size) ** 2)
+    powers = np.arange(6) % (degree + 1)
+
+    def integral(at: np.ndarray) -> np.ndarray:
+        return (at[:, None] / size) ** (powers + 1) * size / (powers + 1)
+
+    points = np.sort([times[0] - 0.05, times[0], 0.4, *times[1:3], size / 2, size - 1.7, times[-1] + 0.05])
+    whole = np.diff(integral(times), axis=0, prepend=0)
+    kernels = [strapgen.evaluator(INTERPOLATION[kind]) for kind in ("rates", "instants")]
+    found = resampling.increments(kernels[0], times, whole, points)
+    # The powers of a sum have one degree more than those of a rate.
+    known = powers < degree
+    np.testing.assert_allclose(found[:, known], np.diff(integral(points), axis=0)[:, known], atol=1e-12)
+    found = resampling.interpolated(kernels[1], times, (times[:, None] / size) ** powers, points)
+    expected = integral(points + 0.5) - integral(points - 0.5)
+    np.testing.assert_allclose(found, expected, atol=1e-12)
 
 
 KEPT = {
@@ -449,3 +472,24 @@ def test_strict_compilers_are_silent(tmp_path, compiler, kind):
         [*compiler, *STRICT, "main.cpp"], cwd=tmp_path, capture_output=True, text=True, check=False
     )
     assert done.returncode == 0, done.stderr
+
+
+def test_a_header_is_verified_by_its_command(tmp_path, capsys):
+    assert (
+        says(["preintegrate", "--window", "pair-1-5", "--name", "imu", "--out", str(tmp_path)], capsys)[0]
+        == 0
+    )
+    path = tmp_path / "imu.hpp"
+    for place in (path, tmp_path):
+        status, said, _ = says(["verify", str(place)], capsys)
+        assert (status, said) == (0, f"{path}: 1 file, in step with the command\n")
+    text = path.read_text()
+    path.write_text(text.replace("if (end <= begin)", "if (end < begin)", 1))
+    number = text[: text.index("if (end <= begin)")].count("\n") + 1
+    status, said, _ = says(["verify", str(path)], capsys)
+    assert status == 1
+    assert f"{path}:{number}: edited: if (end < begin); generated: if (end <= begin)" in said
+    assert verify_files.main([str(tmp_path)]) == 1
+    path.write_text(text.replace("strapgen preintegrate", "sh -c touch", 1))
+    status, _, error = says(["verify", str(path)], capsys)
+    assert (status, error.count("\n")) == (2, 1) and "imu.hpp is no C file" in error

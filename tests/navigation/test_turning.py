@@ -155,14 +155,32 @@ def test_estimates_scatter_as_the_covariance_says(temperatures):
 
 
 def test_a_straight_line_has_the_covariance_of_one():
-    file = read(TEMPERATURES)
-    for one in solved(file):
-        alone = calibrated(replace(file.scheme, temperatures=()), one.quantity)
+    """At 20 deg C of 20, 30 and 60, whose mean is 110/3, and the sum of squares about it 2600/3."""
+    scheme = replace(read(TEMPERATURES).scheme, temperatures=(20.0, 30.0, 60.0))
+    for quantity in QUANTITIES:
+        one, alone = (calibrated(each, quantity) for each in (scheme, replace(scheme, temperatures=())))
         assert one.labels == (*alone.names, *(f"{name} per C" for name in alone.names))
         for name, deviation in alone.deviations.items():
-            if deviation is not None:  # at 20 deg C of 20, 40, 60; sum of squares about the mean 800
-                assert one.deviations[name] == pytest.approx(deviation * math.sqrt(1 / 3 + 20**2 / 800))
-                assert one.deviations[f"{name} per C"] == pytest.approx(deviation / math.sqrt(800))
+            if deviation is not None:
+                first = deviation * math.sqrt(1 / 3 + (110 / 3 - 20) ** 2 / (2600 / 3))
+                assert one.deviations[name] == pytest.approx(first)
+                assert one.deviations[f"{name} per C"] == pytest.approx(deviation / math.sqrt(2600 / 3))
+                place = one.names.index(name)
+                assert one.covariance[place, place] == pytest.approx(first**2)
+
+
+def test_units_and_what_they_gain_by_a_degree_are_drawn_by_themselves():
+    file = PositionsFile(positions=SIDES, temperatures_c=(10.0, 20.0), duration_s=10)
+    biased = InstrumentErrors(gyro=TriadErrors(bias=np.ones(3) * DEG_H), drawn=True)
+    session = Session(file, biased, biased)
+    found = np.array(
+        [
+            [run[name] for name in ("D0_x", "D0_x per C")]
+            for run in (session.run(solved(file), n).estimates for n in range(50))
+        ]
+    )
+    assert np.allclose(found.std(axis=0), 1, atol=0.35)
+    assert abs(np.corrcoef(found.T)[0, 1]) < 0.5
 
 
 def test_a_scale_factor_after_compensation_errs_with_the_rate():

@@ -109,6 +109,8 @@ def frontier_image(result: FrontierResult, path: str | Path) -> bytes:
     for axes in grid[:, 0]:
         axes.set_ylabel("drift, deg/h")
     title = f"drift over {result.duration_s:g} s at {sample_hz:g} Hz"
+    if result.errors:
+        title = f"steady {title} on sensors with errors, {Path(result.errors).name}"
     figures.title(figure, f"{title}; a line joins what halves the drift of all that costs less")
     return figures.image(figure, path)
 

@@ -22,6 +22,7 @@ from strapgen.firmware.verification import paths_of, sources_of_files, whole_hea
 from strapgen.ir import checks
 from strapgen.ir.checks import alternatives
 from strapgen.ir.exceptions import InputError
+from strapgen.navigation.preintegration import preintegrate_command
 from strapgen.navigation.systems import system_command as system
 from strapgen.navigation.two_speed import two_speed_command as two_speed
 from strapgen.run.standard_tree import command_of, text_of
@@ -46,12 +47,13 @@ COMMANDS: dict[str, Callable[..., Any]] = {
     "window generate": window_command.generate,
     "stamped": stamped_command.stamped_grid,
     "system": system.system,
+    "preintegrate": preintegrate_command.preintegrate,
 }
 #: Parameters of these commands that say what is generated. All others write, print or ask for files beside it.
 _VALUES = {
     *("algorithm", "file", "window", "target", "targets"),
     *("sculling", "sample_hz", "cpu", "name", "prefix", "variant"),
-    *("tick_hz", "stamp_bits", "pairs"),
+    *("tick_hz", "stamp_bits", "pairs", "input"),
     *(field.name for group in (MethodOptions, FixedOptions) for field in fields(group)),
 }
 
@@ -99,6 +101,11 @@ class HeaderCommand:
             return stamped_command.generated(
                 **{key: values[key] for key in stated}, name=values["output"].name
             )
+        if self.name == "preintegrate":
+            from strapgen.navigation.preintegration import preintegration_sources
+
+            method, kind, target = (values[key] for key in ("window", "input", "target"))
+            return preintegration_sources.sources(method, kind, target, values["output"].name)
         return self.system(algorithms)[1]
 
     def system(self, algorithms: Iterable[str] = ()) -> tuple[GeneratedStages, Sources]:
@@ -169,7 +176,7 @@ def _values(name: str, words: list[str], text: str) -> dict[str, Any]:
     if argument is not None and argument.parameter.name not in stated:
         raise InputError(f"the header's command names nothing to generate: {text}")
     given = {key: _value(options.options[key], values, text) for key, values in stated.items()}
-    if name == "window generate":
+    if name in ("window generate", "preintegrate") and "window" in given:
         _regular(given["window"])
     return options.typed(given)
 

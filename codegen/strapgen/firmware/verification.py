@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from strapgen import pipeline
 from strapgen.firmware.vectors import MODEL, vectors_of_choice
 from strapgen.firmware.vectors_c import CallVector
+from strapgen.ir.checks import counted
 from strapgen.ir.exceptions import CompilerError, InputError
 from strapgen.ir.fixed_settings import ROTATION_INPUTS
 from strapgen.ir.formats import float_above, places_above
@@ -39,6 +40,8 @@ Array = NDArray[Any]
 CALLS, STEPS = 300, 300
 #: What the commands begin with that generate several functions and a whole that calls them.
 _COMMANDS = ("strapgen system ", "strapgen two-speed ", "strapgen window generate ", "strapgen stamped ")
+#: The command that generates a whole in one header of C++.
+_IN_CPP = "strapgen preintegrate "
 #: Folders of a project that has headers apart from sources.
 _PLACES = ("include", "src")
 _VERSION = re.compile(r'_VERSION "(.*)"')
@@ -118,7 +121,7 @@ class WholeVerification(Result):
     def text(self) -> str:
         """Return the differences, and the results of the calls of each stage."""
         state = "out of step" if self.differences else "in step"
-        lines = [*self.differences, f"{self.header}: {self.files} files, {state} with the command"]
+        lines = [*self.differences, f"{self.header}: {counted(self.files, 'file')}, {state} with the command"]
         return "\n".join([*lines, *(f"{stage.file.stem}: {stage.in_words}" for stage in self.stages)])
 
 
@@ -152,15 +155,15 @@ def paths_of(file: Path) -> tuple[Path, Path]:
 def whole_header(place: Path) -> Path | None:
     """Return the header of a whole: in a folder, or the named file; None for a file of another kind."""
     if not place.is_dir():
-        header = place.with_suffix(".h")
-        return header if place.suffix in (".c", ".h") and _is_whole(header) else None
-    found = [*place.glob("*.h"), *(path for one in _PLACES for path in place.glob(f"{one}/*.h"))]
+        header = place if place.suffix == ".hpp" else place.with_suffix(".h")
+        return header if place.suffix in (".c", ".h", ".hpp") and _is_whole(header) else None
+    found = [*place.glob("*.h*"), *(path for one in _PLACES for path in place.glob(f"{one}/*.h"))]
     headers = sorted(path for path in found if _is_whole(path))
     if len(headers) != 1:
         names = ", ".join(path.name for path in headers) or "none"
         raise InputError(
-            f"{place} holds {names} of the headers of a system, of two speeds, of a commit-late unit or of stamped "
-            "samples; a folder with one is needed"
+            f"{place} holds {names} of the headers of a system, of two speeds, of a commit-late unit, of stamped "
+            "samples or of a preintegration; a folder with one is needed"
         )
     return headers[0]
 
@@ -169,7 +172,7 @@ def _is_whole(header: Path) -> bool:
     if not header.is_file():
         return False
     command = command_of(text_of(header)) or ""
-    return command.startswith(_COMMANDS) and not is_beside(command)
+    return command.startswith(_IN_CPP if header.suffix == ".hpp" else _COMMANDS) and not is_beside(command)
 
 
 def is_beside(command: str) -> bool:
@@ -295,7 +298,7 @@ def _whole_differences(
 ) -> Iterator[str]:
     """Yield the differences from generated files, a line of text each."""
     if header.name not in sources.step_files:
-        first = next(name for name in sources.step_files if name.endswith(".h"))
+        first = next(name for name in sources.step_files if name.endswith((".h", ".hpp")))
         yield f"{header}: other options: the command in it generates {first}"
     for name in expected:
         path, text = beside(header.parent, name), sources.files[name]

@@ -46,7 +46,8 @@ def verify(
     digits. The run is a cone, or the motion or recording that the options state. The exit status is 1 on failure.
 
     FILE may be the folder, or the main header, of a described system, an algorithm in two speeds, a commit-late unit or
-    of stamped samples: all files are then compared, and every stage is called.
+    of stamped samples: all files are then compared, and every stage is called. Of the header in C++ of a preintegration
+    the lines are compared.
 
     Example: strapgen verify generated/c_fixed/euler_rk4_2_w32.c
     """

@@ -44,11 +44,13 @@ def _headers(places: Iterable[Path]) -> Iterator[Path]:
             header = beside(path.parent, f"{path.stem}.h")
             if path.suffix in (".c", ".h") and header.is_file() and _is_generated(header):
                 yield header
+            elif path.suffix == ".hpp" and whole_header(path):
+                yield path
 
 
 def _parts(header: Path) -> Iterator[Path]:
     """Yield the headers of the functions that a whole calls."""
-    texts = [text_of(header), text_of(beside(header.parent, f"{header.stem}.c"))]
+    texts = [text_of(path) for path in (header, beside(header.parent, f"{header.stem}.c")) if path.is_file()]
     for name in re.findall(r'^#include "(.*)"', "\n".join(texts), re.MULTILINE):
         if name != header.name:
             yield beside(header.parent, name)

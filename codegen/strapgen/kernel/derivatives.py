@@ -33,7 +33,8 @@ def add_tangents(
 ) -> dict[sp.Symbol, sp.Expr]:
     """Add a stage for the derivative of every stage that changes, and return the derivatives of all symbols.
 
-    `ending` ends the names of these stages; where a stage is an angle in rad, its change has the `unit`.
+    `ending` ends the names of these stages; where a stage is an angle in rad, its change has the `unit`. A stage whose
+    elements are among the `changes` keeps those.
 
     >>> from strapgen.ir.signals import Signal
     >>> build = KernelBuilder()
@@ -47,6 +48,8 @@ def add_tangents(
     known = dict(changes)
     for stage in list(stages):
         elements = [sp.Symbol(name, real=True) for name in stage.signal.elements]
+        if changes.keys() >= set(elements):
+            continue
         expressions = [
             tangent(element, expression, known)
             for element, expression in zip(elements, stage.expressions, strict=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from fractions import Fraction
 
 import sympy as sp
@@ -12,7 +13,7 @@ from strapgen.navigation.frame.frame_rates import FENNER
 
 #: The modes by their numbers.
 MODES = ("off", "align", "navigate", "attitude")
-_OFF, _ALIGN, _NAVIGATE, _ATTITUDE = map(sp.Integer, range(4))
+_HALF = sp.Rational(1, 2)
 #: Most cycles that a mode lasts until it is ready: 600 s at 50 Hz are 30000.
 _MOST_CYCLES = Fraction((1 << 15) - 1)
 
@@ -21,13 +22,19 @@ def _flag(name: str, meaning: str) -> Signal:
     return Signal.scalar(name, unit="1", meaning=f"{meaning}: 1 or 0", bound=Fraction(1))
 
 
+def _by_mode(number: sp.Symbol, *values: sp.Expr | int) -> sp.Expr:
+    """Return the value of a mode by its number, of those of off, align, navigate and attitude."""
+    pairs = [(value, number >= k - _HALF) for k, value in enumerate(values) if k and value != values[k - 1]]
+    return sp.Piecewise(*reversed(pairs), (values[0], True))
+
+
 def hysteresis() -> Kernel:
     """Return a switch with two thresholds: on from the upper one, off below the lower one, and as it was between them.
 
-    Returns: inputs ``switch``, a state, ``value``, ``lower`` and ``upper``, in one unit; output ``next_switch``.
+    Returns: inputs ``is_on``, a state, ``value``, ``lower`` and ``upper``, in one unit; output ``next_is_on``.
     """
     build = KernelBuilder()
-    state = _flag("switch", "whether the switch is on")
+    state = _flag("is_on", "whether the switch is on")
     before = build.scalar(state)
     value, lower, upper = (
         build.scalar(Signal.scalar(name, unit=ANY, meaning=meaning))
@@ -58,102 +65,46 @@ def mode_sequence() -> Kernel:
     """
     build = KernelBuilder()
     numbers = ", ".join(f"{number} {name}" for number, name in enumerate(MODES))
-    mode, selected = (
-        Signal.scalar(name, unit="1", meaning=f"{meaning}: {numbers}", bound=Fraction(3))
-        for name, meaning in (("mode", "mode of the reference"), ("selected", "mode that is selected"))
-    )
+    mode = Signal.scalar("mode", unit="1", meaning=f"mode: {numbers}", bound=Fraction(3))
     left = Signal.scalar("left", unit="1", meaning="cycles until the mode is ready", bound=_MOST_CYCLES)
-    m, rest, wanted = build.scalar(mode), build.scalar(left), build.scalar(selected)
-    speed, slow = (
-        build.scalar(Signal.scalar(name, unit="m/s", meaning=meaning, bound=Fraction(2108)))
-        for name, meaning in (
-            ("ground_speed", "horizontal velocity relative to the earth"),
-            ("slow", "ground speed below which an alignment may begin again; printed 20 knots"),
+    m, rest, wanted = map(build.scalar, (mode, left, replace(mode, name="selected", elements=("selected",))))
+    speed, slow, full, short, start = (
+        build.scalar(Signal.scalar(name, unit=unit, meaning=meaning, bound=bound))
+        for name, unit, meaning, bound in (
+            ("ground_speed", "m/s", "horizontal velocity relative to the earth", Fraction(2108)),
+            ("slow", "m/s", "speed below which an alignment may begin; printed 20 knots", Fraction(2108)),
+            ("alignment", "1", "cycles of one from off; printed 10 s and 10 min", _MOST_CYCLES),
+            ("realignment", "1", "cycles of one after navigation; printed 30 s", _MOST_CYCLES),
+            ("attitude_start", "1", "cycles until full performance; printed 20 s", _MOST_CYCLES),
         )
     )
-    full, short, start = (
-        build.scalar(Signal.scalar(name, unit="1", meaning=meaning, bound=_MOST_CYCLES))
-        for name, meaning in (
-            ("alignment", "cycles of an alignment from off; printed 10 s and 10 min"),
-            ("realignment", "cycles of an alignment after navigation; printed 30 s"),
-            ("attitude_start", "cycles until full performance of the attitude mode; printed 20 s"),
-        )
+    # A row has a column for each mode, of those selected first.
+    stopped = build.value(
+        "stopped", sp.Piecewise((2, speed >= slow), (1, True)), "navigation, align selected"
     )
-
-    def is_at_least(value: sp.Symbol, number: sp.Integer) -> sp.Expr:
-        """Compare numbers of modes half way to the one below."""
-        return value >= number - sp.Rational(1, 2)
-
-    def choose(name: str, meaning: str, *cases: tuple[sp.Expr, sp.Expr]) -> sp.Symbol:
-        """Name the value of the first case that holds; one without a condition holds."""
-        return build.value(name, sp.Piecewise(*cases), meaning)
-
-    fast = choose("fast", "mode after navigation, align selected", (_NAVIGATE, speed >= slow), (_ALIGN, True))
-    aligned = choose(
-        "aligned", "mode after an alignment, navigation selected", (_NAVIGATE, rest <= 1), (_ALIGN, True)
-    )
-    moving = choose(
-        "moving", "mode after navigation", (_NAVIGATE, is_at_least(wanted, _NAVIGATE)), (fast, True)
-    )
-    waiting = choose(
-        "waiting", "mode after aligning", (aligned, is_at_least(wanted, _NAVIGATE)), (_ALIGN, True)
-    )
-    free = choose(
-        "free",
-        "mode without off and attitude",
-        (moving, is_at_least(m, _NAVIGATE)),
-        (waiting, is_at_least(m, _ALIGN)),
-        (_ALIGN, True),
-    )
-    level = choose(
-        "level",
-        "mode without off, not attitude before",
-        (_ATTITUDE, is_at_least(wanted, _ATTITUDE)),
-        (free, True),
-    )
-    held = choose("held", "mode without off", (_ATTITUDE, is_at_least(m, _ATTITUDE)), (level, True))
-    after = choose("after", "next mode", (held, is_at_least(wanted, _ALIGN)), (_OFF, True))
-    # Align and attitude last their cycles, and the others none.
-    begun = choose(
-        "begun", "cycles of an alignment that begins", (short, is_at_least(m, _NAVIGATE)), (full, True)
-    )
+    aligned = build.value("aligned", sp.Piecewise((2, rest <= 1), (1, True)), "align, navigation selected")
+    rows = ((0, 1, 1, 3), (0, 1, aligned, 3), (0, stopped, 2, 3), (0, 3, 3, 3))
+    after = [
+        build.value(f"after_{name}", _by_mode(wanted, *row), f"mode after {name}")
+        for name, row in zip(MODES, rows, strict=True)
+    ]
+    new = build.value("new", _by_mode(m, *after), "next mode")
     going_on = build.value("going_on", sp.Max(rest - 1, 0), "cycles left of what goes on")
-    in_alignment = choose(
-        "in_alignment",
-        "cycles left of an alignment",
-        (begun, is_at_least(m, _NAVIGATE)),
-        (going_on, is_at_least(m, _ALIGN)),
-        (begun, True),
+    in_align = build.value(
+        "in_align", _by_mode(m, full, going_on, short, full), "cycles left of an alignment"
     )
-    in_attitude = choose(
-        "in_attitude",
-        "cycles left until full performance",
-        (going_on, is_at_least(m, _ATTITUDE)),
-        (start, True),
+    in_attitude = build.value(
+        "in_attitude", _by_mode(m, start, start, start, going_on), "cycles left of the start"
     )
-    moved = choose(
-        "moved", "whether the mode was navigate or attitude", (1, is_at_least(m, _NAVIGATE)), (0, True)
+    remaining = build.value("remaining", _by_mode(new, 0, in_align, 0, in_attitude), "cycles left")
+    over = build.value(
+        "over", sp.Piecewise((0, remaining >= _HALF), (1, True)), "whether none is left: 1 or 0"
     )
-    build.feedback(mode, [after])
-    following = build.feedback(
-        left,
-        [
-            sp.Piecewise(
-                (in_attitude, is_at_least(after, _ATTITUDE)),
-                (0, is_at_least(after, _NAVIGATE)),
-                (in_alignment, is_at_least(after, _ALIGN)),
-                (0, True),
-            )
-        ],
-    )[0]
-    build.output(
-        _flag("ready", "whether the mode is on and has no cycles left"),
-        [sp.Piecewise((0, following >= sp.Rational(1, 2)), (1, is_at_least(after, _ALIGN)), (0, True))],
-    )
-    build.output(
-        _flag("reset", "whether velocities are set to zero, since an alignment begins"),
-        [sp.Piecewise((0, is_at_least(after, _NAVIGATE)), (moved, is_at_least(after, _ALIGN)), (0, True))],
-    )
+    moved = build.value("moved", _by_mode(m, 0, 0, 1, 0), "whether the mode was navigate: 1 or 0")
+    build.feedback(mode, [new])
+    build.feedback(left, [remaining])
+    build.output(_flag("ready", "whether the mode is on, no cycles left"), [_by_mode(new, 0, over, 1, over)])
+    build.output(_flag("reset", "whether velocities are set to zero"), [_by_mode(new, 0, moved, 0, 0)])
     return build.kernel(
         "mode-sequence",
         "Sequence of the modes off, align, navigate and attitude",

@@ -30,6 +30,12 @@ SAMPLING = {
     "velocity-counts": _recipe(
         "velocity increments from counts", "systems.sampling", "scaled_counts", "velocity"
     ),
+    "interpolated-integral": _recipe(
+        "integral from a sample to a time, by a polynomial", "preintegration.interpolation", "integral"
+    ),
+    "interpolated-mean": _recipe(
+        "mean over an interval from samples, by a polynomial", "preintegration.interpolation", "mean"
+    ),
 }
 
 _TWO_SPEED = "two_speed.two_speed_loops"
@@ -210,6 +216,7 @@ LOOPS = {
     "heading-loop": _recipe("heading loop of second order", _LOOPS, "heading_loop"),
     "heading-from-dcm": _recipe("heading of an attitude", _LOOPS, "heading_of_attitude"),
     "vertical-loop": _recipe("vertical loop of third order", _LOOPS, "vertical_loop"),
+    "height-hysteresis": _recipe("hysteresis of the feedback of a height", _LOOPS, "height_hysteresis"),
     "tuned-rotor-loop": _recipe(
         "loop of a tuned-rotor gyro with rate observer", "instruments.tuned_rotor", "tuned_rotor_loop"
     ),

@@ -131,7 +131,7 @@ _CHANGE = "velocity-position"
 #: The algorithms that are compared by default.
 DEFAULT = (
     *(f"{TWO_SPEED}:2", "rk4:2", "coning-combined:3+3"),
-    *("window-3-3", "window-5-5", "window-7-7", "window-9-9"),
+    *("pair-1-5", "pair-1-8", "window-7-7", "window-9-9"),
 )
 #: Room in the formats of fixed point above the largest increment.
 _ROOM = Fraction(9, 8)
@@ -171,8 +171,8 @@ class TestProfile:
 def candidates(names: Iterable[str]) -> list[Candidate]:
     """Return the algorithms of a study, checked.
 
-    >>> [one.name for one in candidates(["two-speed:4", "window-3-3"])]
-    ['two-speed:4', 'window-3-3:1+3+3']
+    >>> [one.name for one in candidates(["two-speed:4", "pair-1-8"])]
+    ['two-speed:4', 'pair-1-8:1+8+8']
     """
     several: list[Candidate] = []
     for name in names:

@@ -47,7 +47,7 @@ def step(method: Method, increments: int, previous: int = 0, ahead: int = 0) -> 
         part: _named(build, f"{part}_change", value, "m/s", f"{part} change, axes at the start of the step")
         for part, value in changes.items()
     }
-    by_samples = _by_samples(build, turn, changed, sp.Rational(1, increments))
+    by_samples = _by_samples(build, turn, changes["velocity"], changed, sp.Rational(1, increments))
     sums = _Sums(build)
     r = sums.states["rotation"]
     dr = _matrix(
@@ -177,13 +177,14 @@ class _Sums:
 def _by_samples(
     build: KernelBuilder,
     turn: velocity_position.StepRotation,
+    velocity: sp.Matrix,
     changed: dict[str, sp.Matrix],
     part: sp.Rational,
 ) -> dict[tuple[str, str], sp.Matrix]:
     """Return the derivatives of the step's changes by the sum of its samples, of which each takes the same part.
 
     They are in the axes at its start; those of the left rotation by the rate are those of the velocity by the force, by
-    transference.
+    transference, also where the position follows from the `velocity`.
     """
     stages = tuple(build.stages)
     columns: dict[tuple[str, str], list[sp.Matrix]] = {block: [] for block in BLOCKS}
@@ -200,14 +201,16 @@ def _by_samples(
         columns["rotation", "rate"].append(left)
         columns["velocity", "rate"].append(changed["velocity"].applyfunc(known.__getitem__))
         columns["position", "rate"].append(changed["position"].applyfunc(known.__getitem__))
+    left = _matrix(
+        build, "left_by_rate", sp.Matrix.hstack(*columns["rotation", "rate"]), "left turn by the rate"
+    )
+    for axis in range(3):
         along = dict.fromkeys(forces[:, axis], part)
+        along |= {symbol: by for symbol, by in zip(velocity, left[:, axis], strict=True) if symbol.is_Symbol}
         known = add_tangents(build, stages, along, f"by_force_{axis}", "1")
         columns["position", "force"].append(
             changed["position"].applyfunc(lambda symbol, known=known: known.get(symbol, sp.S.Zero))
         )
-    left = _matrix(
-        build, "left_by_rate", sp.Matrix.hstack(*columns["rotation", "rate"]), "left turn by the rate"
-    )
     blocks = {block: sp.Matrix.hstack(*some) for block, some in columns.items() if some}
     return blocks | {("rotation", "rate"): left, ("velocity", "force"): left}
 

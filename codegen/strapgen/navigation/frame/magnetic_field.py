@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from fractions import Fraction
+from functools import cache
 
 import sympy as sp
 
@@ -20,58 +22,50 @@ SMALLEST_RADIUS = 6_256_752
 #: Years from the epoch, on both sides.
 MOST_YEARS = 10
 
-_LATITUDE, _LONGITUDE = (
-    Signal.scalar(name, unit="rad", meaning=meaning, bound=bound)
-    for name, meaning, bound in (
-        ("latitude", "geodetic latitude on the ellipsoid WGS 84", Fraction(355, 226)),
-        ("longitude", "longitude, positive to the east", Fraction(355, 113)),
+_INPUTS = tuple(
+    Signal.scalar(name, unit=unit, meaning=meaning, bound=bound)
+    for name, unit, meaning, bound in (
+        ("latitude", "rad", "geodetic latitude on the ellipsoid WGS 84", Fraction(355, 226)),
+        ("longitude", "rad", "longitude, positive to the east", Fraction(355, 113)),
+        ("height", "m", "height above the ellipsoid WGS 84", Fraction(100_000)),
+        ("years", "year", "time since the epoch of the coefficients", Fraction(MOST_YEARS)),
     )
 )
-_HEIGHT = Signal.scalar(
-    "height", unit="m", meaning="height above the ellipsoid WGS 84", bound=Fraction(100_000)
-)
-_YEARS = Signal.scalar(
-    "years", unit="year", meaning="time since the epoch of the coefficients", bound=Fraction(MOST_YEARS)
-)
+
+Pair = tuple[sp.Expr, sp.Expr]
 
 
-class _Harmonics:
-    """Solid harmonics (R/r)^(n+1) P_n^m(sin latitude) cos and sin(m longitude), Schmidt semi-normalised, by recursion.
+def _harmonics(build: KernelBuilder, a: sp.Matrix, square: sp.Symbol) -> Callable[[int, int], Pair]:
+    """Return solid harmonics (R/r)^(n+1) P_n^m(sin latitude) cos and sin(m longitude) by degree and order.
 
-    Products of the elements of a = R (x, y, z)/r^2 and of its square (R/r)^2 alone: nothing is singular at a pole.
+    They are Schmidt semi-normalised, and made by recursion: products of the elements of a = R (x, y, z)/r^2 and of its
+    square (R/r)^2 alone, so that nothing is singular at a pole.
     """
+    x, y, z = a
 
-    def __init__(self, build: KernelBuilder, a: sp.Matrix, square: sp.Symbol) -> None:
-        self._build, self._a, self._square = build, a, square
-        start = build.value("V_0_0", sp.sqrt(square), "R/r")
-        self._known: dict[tuple[int, int], tuple[sp.Expr, sp.Expr]] = {(0, 0): (start, sp.S.Zero)}
-
-    def pair(self, n: int, m: int) -> tuple[sp.Expr, sp.Expr]:
-        """Return the harmonics of degree n and order m, with cosine and sine; zero where there are none."""
-        if m > n:  # before the first one of a column
+    @cache
+    def pair(n: int, m: int) -> Pair:
+        """Return the harmonics with cosine and sine; zero before the first one of an order."""
+        if m > n:
             return sp.S.Zero, sp.S.Zero
-        if (n, m) not in self._known:
-            self._known[n, m] = self._named(n, m, *self._formula(n, m))
-        return self._known[n, m]
-
-    def _formula(self, n: int, m: int) -> tuple[sp.Expr, sp.Expr]:
-        x, y, z = self._a
+        if n == 0:
+            return build.value("V_0_0", sp.sqrt(square), "R/r"), sp.S.Zero
         if m == n:
-            V, W = self.pair(n - 1, n - 1)
+            V, W = pair(n - 1, n - 1)
             factor = sp.sqrt(sp.Rational(2 * n - 1, 2 * n)) if n > 1 else sp.S.One
-            return factor * (x * V - y * W), factor * (x * W + y * V)
-        root = sp.sqrt(n**2 - m**2)
-        one, two = (2 * n - 1) / root, sp.sqrt((n - 1) ** 2 - m**2) / root
-        before, again = self.pair(n - 1, m), self.pair(n - 2, m)
-        V, W = (one * z * b - two * self._square * a for b, a in zip(before, again, strict=True))
-        return V, W
-
-    def _named(self, n: int, m: int, V: sp.Expr, W: sp.Expr) -> tuple[sp.Expr, sp.Expr]:
-        words = f"degree {n}, order {m}"
-        cosine = self._build.value(f"V_{n}_{m}", V, f"harmonic with the cosine, {words}")
-        return cosine, self._build.value(
-            f"W_{n}_{m}", W, f"harmonic with the sine, {words}"
+            formulas = factor * (x * V - y * W), factor * (x * W + y * V)
+        else:
+            one, two = (2 * n - 1) * z, sp.sqrt((n - 1) ** 2 - m**2) * square
+            root = sp.sqrt(n**2 - m**2)
+            both = zip(pair(n - 1, m), pair(n - 2, m), strict=True)
+            formulas = tuple(one / root * before - two / root * again for before, again in both)
+        about = f"degree {n}, order {m}"
+        cosine = build.value(f"V_{n}_{m}", formulas[0], f"harmonic with the cosine, {about}")
+        return cosine, build.value(
+            f"W_{n}_{m}", formulas[1], f"harmonic with the sine, {about}"
         ) if m else sp.S.Zero
+
+    return pair
 
 
 def _normal(n: int, m: int) -> sp.Expr:
@@ -119,7 +113,7 @@ def _largest(model: MagneticModel, n: int) -> int:
 
 
 def _earth_fixed(
-    build: KernelBuilder, harmonics: _Harmonics, model: MagneticModel, years: sp.Symbol
+    build: KernelBuilder, pair: Callable[[int, int], Pair], model: MagneticModel, years: sp.Symbol
 ) -> sp.Matrix:
     """Return the field, minus the gradient of R sum of g V + h W, in earth-fixed axes: a sum over the degrees."""
     field = sp.zeros(3, 1)
@@ -128,7 +122,7 @@ def _earth_fixed(
         for k in range(n + 2):
             at, rate = (_gradient(model, n, k, rates) for rates in (False, True))
             for axis in range(3):
-                for harmonic, now, change in zip(harmonics.pair(n + 1, k), at[axis], rate[axis], strict=True):
+                for harmonic, now, change in zip(pair(n + 1, k), at[axis], rate[axis], strict=True):
                     part[axis] += harmonic * (now + change * years)
         free, limited = (
             Signal.vector(
@@ -148,7 +142,7 @@ def magnetic_field(model: MagneticModel) -> Kernel:
     east and down, ``horizontal`` and ``total`` in nT, ``declination`` and ``inclination`` in rad.
     """
     build = KernelBuilder()
-    latitude, longitude, height, years = map(build.scalar, (_LATITUDE, _LONGITUDE, _HEIGHT, _YEARS))
+    latitude, longitude, height, years = map(build.scalar, _INPUTS)
     (cl, sl), (co, so) = (
         (build.value(f"cos_{angle}", sp.cos(angle)), build.value(f"sin_{angle}", sp.sin(angle)))
         for angle in (latitude, longitude)
@@ -170,7 +164,7 @@ def magnetic_field(model: MagneticModel) -> Kernel:
     )
     x, y, z = build.stage(
         Signal.vector("earth_fixed", "B", unit="nT", meaning="field, earth-fixed axes", frame="e"),
-        _earth_fixed(build, _Harmonics(build, a, ratio), model, years),
+        _earth_fixed(build, _harmonics(build, a, ratio), model, years),
     )
     outward = build.value("outward", co * x + so * y, "field away from the axis")
     names = ("north_field", "east_field", "down_field")

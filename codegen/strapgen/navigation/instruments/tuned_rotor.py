@@ -42,7 +42,7 @@ _CONSTANTS = (
 )
 
 
-def _pair(name: str, meaning: str, bound: Fraction, unit: str, over: str = "") -> Signal:
+def _pair(name: str, meaning: str, bound: Fraction | None, unit: str, over: str = "") -> Signal:
     return Signal.labelled(
         name, name, "xy", unit=unit, meaning=f"{meaning}, axes x and y", bound=bound, over=over
     )
@@ -65,25 +65,12 @@ def tuned_rotor_loop() -> Kernel:
     a, w, d, u = map(build.input, states)
     measured = build.input(_pair(*_ANGLE, unit="rad"))
     turn, share, l1, l2, l3, k1, k2 = (build.input(_pair(*one, unit="1")) for one in _CONSTANTS)
-    off = build.stage(
-        Signal.labelled("off", "off", "xy", unit="rad", meaning="measured less estimated angle"), measured - a
-    )
-    nutation = build.stage(
-        Signal.labelled("nutation", "nutation", "xy", unit="rad", meaning="nutation in a cycle"), w - u
-    )
-    new = [
-        build.feedback(state, value)
-        for state, value in zip(
-            states,
-            (
-                a + d - u - _times(share, nutation) + _times(l1, off),
-                u + _times(turn, nutation) + _times(l2, off),
-                d + _times(l3, off),
-            ),
-            strict=False,
-        )
-    ]
-    build.feedback(states[3], new[2] + _times(k1, new[0]) + _times(k2, new[1] - new[2]))
+    off = build.stage(_pair("off", "measured less estimated angle", None, "rad"), measured - a)
+    nutation = build.stage(_pair("nutation", "nutation in a cycle", None, "rad"), w - u)
+    new_a = build.feedback(states[0], a + d - u - _times(share, nutation) + _times(l1, off))
+    new_w = build.feedback(states[1], u + _times(turn, nutation) + _times(l2, off))
+    new_d = build.feedback(states[2], d + _times(l3, off))
+    build.feedback(states[3], new_d + _times(k1, new_a) + _times(k2, new_w - new_d))
     return build.kernel(
         "tuned-rotor-loop",
         "Loop of a tuned-rotor gyro with an observer of its rates",
@@ -100,10 +87,6 @@ def tuned_rotor_gains(nutation_hz: float, cycle_s: float, observer_pole: float, 
 
     `nutation_hz`: nutation frequency. `observer_pole`, `loop_pole`: from 0 to below 1; the observer is the faster the
     smaller it is.
-
-    >>> gains = tuned_rotor_gains(300, 1e-3, 0.5, 0.7)
-    >>> [round(float(part), 4) for part in gains["turn"]]
-    [-0.309, 0.9511]
     """
     for name, value in (("nutation_hz", nutation_hz), ("cycle_s", cycle_s)):
         if not 0 < value < math.inf:

@@ -16,7 +16,8 @@ from typing import Any
 import numpy as np
 import sympy as sp
 
-from strapgen.ir.interfaces import Argument, Interface
+from strapgen.ir.formats import float_above
+from strapgen.ir.interfaces import Interface
 from strapgen.navigation.kalman.kalman_filter import KalmanFilter
 from strapgen.run.evaluators import Array
 
@@ -63,7 +64,8 @@ class _Loop:
         self.rows = _doubles(model.H)
         self.time_error = self._errors(time)
         self.update_errors = [self._errors(one) for one in updates]
-        self.innovations = [_largest(one.outputs[0]) for one in updates]
+        words = [(max(-one.outputs[0].low, one.outputs[0].high), one.outputs[0].unit) for one in updates]
+        self.innovations = [float_above(largest * unit) for largest, unit in words]
         assert model.solved is not None
         self.gains = [
             [np.array([float(x) for x in row]) for row in model.solved.rows[name]]
@@ -79,7 +81,7 @@ class _Loop:
 
     def _errors(self, interface: Interface) -> Array:
         errors = {one.signal.name: max(one.errors) for one in interface.outputs}
-        return np.array([np.nextafter(float(errors[f"next_{name}"]), np.inf) for name in self.names])
+        return np.array([float_above(errors[f"next_{name}"]) for name in self.names])
 
     def parts(self, step: int) -> Iterator[tuple[Array, Array]]:
         """Yield the matrix of every call of a step, and what it adds."""
@@ -89,17 +91,17 @@ class _Loop:
                 which = min(step // one.every, len(self.gains[place])) - 1
                 gain, row = self.gains[place][which], self.rows[place]
                 added = self.update_errors[place] + self.rounded[place][which] * self.innovations[place]
-                # The matrix is rounded from exact numbers, by at most a unit of 1 + |K h|.
                 yield np.eye(len(gain)) - np.outer(gain, row), added
 
     def scheduled(self) -> Array:
         """Return the largest errors after any step of the schedule."""
         assert self.text.steps is not None
+        n = len(self.names)
         directions, worst = np.diag(self.start), self.start.copy()
         for step in range(1, self.text.steps + 1):
             for matrix, added in self.parts(step):
-                size = _sum(directions)
-                lost = _rounding(matrix, size)
+                # The matrix is rounded from exact numbers, by at most a unit of it and of the identity.
+                lost = (n + 3) * _UNIT * ((np.abs(matrix) + np.eye(n)) @ _sum(directions))
                 directions = np.hstack([matrix @ directions, np.diag((added + lost) * (1 + _UNIT))])
                 worst = np.maximum(worst, _sum(directions))
             directions = _fewer(directions)
@@ -112,7 +114,8 @@ class _Loop:
         loop, majorant, added, between, calls = np.eye(n), np.eye(n), self.start, [], 0
         for step in range(1, self.text.measurements[0].every + 1):
             for matrix, more in self.parts(step):
-                loop, majorant, calls = matrix @ loop, np.abs(matrix) @ majorant, calls + 1
+                loop, majorant = matrix @ loop, (np.abs(matrix) + np.eye(n)) @ majorant
+                calls += 1
                 added = (np.abs(matrix) @ added + more) * (1 + (n + 2) * _UNIT)
                 between.append((np.abs(loop), added))
         added = np.maximum(added, added.max() * 2.0**-40)
@@ -131,12 +134,6 @@ class _Loop:
                 reached = [size @ whole * (1 + 1e-9) + more for size, more in between]
                 return np.asarray(np.max([whole, *reached], axis=0))
         return None
-
-
-def _rounding(matrix: Array, size: Array) -> Array:
-    """Return what a product of a rounded matrix in double rounds, of directions of a size."""
-    n = len(size)
-    return np.asarray((n + 3) * _UNIT * ((np.abs(matrix) + np.eye(n)) @ size))
 
 
 def _sum(directions: Array) -> Array:
@@ -160,14 +157,10 @@ def _doubles(matrix: sp.Matrix) -> Array:
     return np.array([[float(x) for x in matrix[i, :]] for i in range(matrix.rows)])
 
 
-def _largest(argument: Argument) -> float:
-    return float(max(abs(argument.low), abs(argument.high)) * argument.unit) * (1 + _UNIT)
-
-
 def _gain_errors(interface: Interface, row: list[Fraction]) -> Any:
     """Return by how much the gains of a row differ from those in the formats of the code."""
     taken = [one for one in interface.inputs if one.signal.name.startswith("gain_")]
     if not taken:
         return np.zeros(len(row))
-    errors = [abs(one.format.nearest(gain) * one.unit - gain) for one, gain in zip(taken, row, strict=True)]
-    return np.array([np.nextafter(float(error), np.inf) for error in errors])
+    pairs = zip(taken, row, strict=True)
+    return np.array([float_above(abs(one.format.nearest(gain) * one.unit - gain)) for one, gain in pairs])

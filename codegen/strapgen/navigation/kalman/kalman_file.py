@@ -24,12 +24,14 @@ from strapgen.storage import streams
 from strapgen.targets.names import PYTHON, C
 
 #: Most states, measurements, inputs and steps of a filter.
-MOST_STATES, MOST_STEPS = 32, 1_000_000
+MOST_STATES, MOST_STEPS = 32, 100_000
 _NAME = Key(
     "Name; all names of the file are different",
     pattern="(?!.*__)[a-z][a-z0-9_]{0,30}(?<!_)",
     form="a name of at most 31 lower-case letters, digits and single underscores, which begins with a letter,",
 )
+#: Functions of formulas, which code in floating point and its derivatives have.
+_IN_CODE = {name: FUNCTIONS[name] for name in ("sqrt", "sin", "cos", "atan2")}
 _TAKEN = re.compile(r"state|covariance|measured|innovation(_variance)?|(next|gain)_.*")
 
 
@@ -257,7 +259,7 @@ class _Terms:
         rest: dict[str, Any] = {}
         if term:
             place = f"{where}.{term}"
-            formula = expression(place, getattr(one, term), known)
+            formula = expression(place, getattr(one, term), known, _IN_CODE)
             rest["expression"] = formula.replace(lambda x: x.is_number, lambda x: _rational(place, x))
             rest["deviation"] = self.number(f"{where}.deviation", one.deviation, **limit)
         if kind == "state":

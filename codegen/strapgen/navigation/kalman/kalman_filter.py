@@ -19,8 +19,9 @@ from strapgen.ir.formats import Format
 from strapgen.ir.notebook_display import Records, short_repr
 from strapgen.ir.program import Program
 from strapgen.ir.sources import Sources
+from strapgen.kernel.kernel import Kernel
 from strapgen.navigation.kalman import FORMS, kalman_file, riccati
-from strapgen.navigation.kalman.kalman_kernels import FilterKernel, kernels, triangle
+from strapgen.navigation.kalman.kalman_kernels import kernels, triangle
 from strapgen.navigation.kalman.kalman_model import FilterModel
 from strapgen.run.backend_names import BACKENDS, of_sources
 from strapgen.run.evaluators import Array, Evaluator
@@ -132,7 +133,7 @@ class KalmanFilter(FilterModel):
         rows = {name: np.array(one, float) for name, one in self.solved.rows.items()}
         return {name: one[0] for name, one in rows.items()} if self.text.kind == "steady" else rows
 
-    def kernels(self, form: str | None = None) -> list[FilterKernel]:
+    def kernels(self, form: str | None = None) -> list[Kernel]:
         """Return the kernels, the time update first; `form` takes the place of that of the filter."""
         return kernels(self.with_form(form), self.solved.rows if self.solved else None)
 
@@ -149,7 +150,7 @@ class KalmanFilter(FilterModel):
         return stored(
             "kalman-programs",
             [repr(self.text)],
-            lambda: [pipeline.lower(one.kernel) for one in self.kernels()],
+            lambda: [pipeline.lower(kernel) for kernel in self.kernels()],
         )
 
     def sources(self, target: str, settings: Settings | None = None) -> list[Sources]:
@@ -275,31 +276,17 @@ class KalmanFilter(FilterModel):
 
 @dataclass(frozen=True)
 class FilterRun(Records):
-    """What a filter estimated.
+    """What a filter estimated: before the first step, and after each of N."""
 
-    Parameters
-    ----------
-    names : tuple of str
-        The states.
-    states : array, (..., N + 1, n)
-        Estimates, before the first step and after each.
-    covariances : array, (..., N + 1, n, n), or None
-        Covariances, where they are computed online.
-    innovations : dict of str to array, (..., N)
-        Measured less expected, by the measurement; nan where there was none.
-    variances : dict of str to array, (..., N), or None
-        Variances of the innovations.
-
-    Examples
-    --------
-    >>> FilterRun(("bias",), np.zeros((3, 1)), None, {}, None)
-    FilterRun(2 steps of bias)
-    """
-
+    #: The n states
     names: tuple[str, ...]
+    #: Estimates, (..., N + 1, n)
     states: Array
+    #: Covariances, (..., N + 1, n, n); None where gains are computed before
     covariances: Array | None
+    #: Measured less expected, (..., N) by the measurement; nan where there was none
     innovations: dict[str, Array]
+    #: Variances of the innovations; None as for the covariances
     variances: dict[str, Array] | None
 
     __repr__ = short_repr
@@ -311,17 +298,8 @@ class FilterRun(Records):
 class FilterStepper:
     """A filter on a back end, called step by step.
 
-    Parameters
-    ----------
-    model : KalmanFilter
-    backend : str
-    word : int or None
-
-    Examples
-    --------
     >>> stepper = kalman("examples/kalman/gyrocompass.toml").on("numpy")
-    >>> state, covariance = stepper.time_update(*stepper.start())
-    >>> state
+    >>> stepper.time_update(*stepper.start())[0]
     array([0., 0., 0.])
     """
 

@@ -10,7 +10,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from fractions import Fraction
-from typing import NamedTuple
 
 import sympy as sp
 
@@ -31,28 +30,16 @@ _SOURCES = {
 _RANK = sp.Rational(1, 10**40)
 
 
-class FilterKernel(NamedTuple):
-    """A kernel of a filter: the time update, or the update of a measurement."""
-
-    kernel: Kernel
-    #: None for the time update
-    measurement: Quantity | None
-
-
-def kernels(
-    model: FilterModel, gains: Mapping[str, Sequence[Sequence[Fraction]]] | None
-) -> list[FilterKernel]:
-    """Return the kernels of a filter; without `gains` its covariance is computed online.
+def kernels(model: FilterModel, gains: Mapping[str, Sequence[Sequence[Fraction]]] | None) -> list[Kernel]:
+    """Return the kernels of a filter, the time update first; without `gains` its covariance is computed online.
 
     `gains`: rows of gains by the measurement; a single row is a constant of the code.
     """
     form = "fixed" if gains is not None else model.text.form
     builders: dict[str, type[_Builder]] = {"joseph": _Joseph, "ud": _Factors, "fixed": _Fixed}
     build = builders[form]
-    return [
-        FilterKernel(build(model, None, gains).time_update(), None),
-        *(FilterKernel(build(model, one, gains).update(), one) for one in model.text.measurements),
-    ]
+    updates = [build(model, one, gains).update() for one in model.text.measurements]
+    return [build(model, None, gains).time_update(), *updates]
 
 
 def triangle(size: int) -> list[tuple[int, int]]:

@@ -10,7 +10,9 @@ from fractions import Fraction
 from functools import cached_property
 from typing import NamedTuple
 
+import numpy as np
 import sympy as sp
+from numpy.typing import NDArray
 from sympy.polys.matrices import DomainMatrix
 
 from strapgen.ir.exceptions import InputError
@@ -19,7 +21,9 @@ from strapgen.kernel.kernel import DIGITS
 from strapgen.navigation.kalman.kalman_file import FilterText
 
 #: What the series of a constant transition may leave out, and the most terms of it.
-_LEFT_OUT, _MOST_TERMS = Fraction(1, 10**30), 60
+_LEFT_OUT, _MOST_TERMS = 1e-30, 60
+#: What covers the rounding of a bound in double.
+_SPARE = 1e-9
 #: Most states and symbols with which combinations are solved for in symbols, beyond which at general numbers.
 _SYMBOLIC = 8, 4
 #: Magnitude above which an eigenvalue does not decay: 1, less what computing it in 50 digits may add.
@@ -151,28 +155,37 @@ class FilterModel:
         return self.is_constant and not any(self.F ** (self.order + 1))
 
     @cached_property
-    def left_out(self) -> Fraction | None:
-        """Bound of what the series of the transition leaves out, each state by its range; None where none is known."""
-        return Fraction(0) if self.is_nilpotent else self._left_out(self.order)
+    def left_out(self) -> float | None:
+        """Bound of what the series of the transition leaves out, each state by its range; None where none is known.
 
-    def _left_out(self, order: int) -> Fraction | None:
-        size = self._norm
-        if size is None or size >= order + 2:
+        The initial deviation takes the place of a range that is not stated.
+        """
+        return 0.0 if self.is_nilpotent else self._left_out(self.order)
+
+    def _left_out(self, order: int) -> float | None:
+        if self._scaled is None or (norm := float(self._scaled.sum(axis=1).max())) >= order + 2:
             return None
-        return size ** (order + 1) / math.factorial(order + 1) / (1 - size / (order + 2))
+        # Of a matrix without negative elements: the terms that follow are at most a geometric series.
+        first = float(np.linalg.matrix_power(self._scaled, order + 1).sum(axis=1).max())
+        return first / math.factorial(order + 1) / (1 - norm / (order + 2)) * (1 + _SPARE)
 
     @cached_property
-    def _norm(self) -> Fraction | None:
-        """Bound of the largest sum of a row of F times the interval, each state in units of its range."""
+    def _scaled(self) -> NDArray[np.float64] | None:
+        """Bounds of the elements of F T, each state in units of its range; None where there are none."""
         scales = [one.range or one.deviation for one in self.text.states]
-        largest = Fraction(0)
-        for row, scale in enumerate(scales):
-            sizes = [self._magnitude(entry) for entry in self.F[row, :]]
-            if None in sizes:
-                return None
-            total = sum((size or 0) * other for size, other in zip(sizes, scales, strict=True))
-            largest = max(largest, total / scale * self.text.interval)
-        return Fraction(math.ceil(largest * 10**12), 10**12)
+        sizes = [[self._magnitude(entry) for entry in self.F[row, :]] for row in range(len(scales))]
+        if any(size is None for row in sizes for size in row):
+            return None
+        T = self.text.interval
+        return np.array(
+            [
+                [
+                    float((size or 0) * other / scale * T) * (1 + _SPARE)
+                    for size, other in zip(row, scales, strict=True)
+                ]
+                for row, scale in zip(sizes, scales, strict=True)
+            ]
+        )
 
     def _magnitude(self, entry: sp.Expr) -> Fraction | None:
         """Return a bound of a polynomial over the ranges of inputs and states; None where there is none."""
@@ -237,7 +250,7 @@ class FilterModel:
         if not self.is_constant:
             return Q
         # What is below the part that the series leaves out is none.
-        least = exact(_LEFT_OUT**2)
+        least = sp.Rational(1, 10**60)
         return sp.Matrix(*Q.shape, lambda i, j: Q[i, j] if Q[i, j] ** 2 > least * Q[i, i] * Q[j, j] else 0)
 
     @cached_property

@@ -117,7 +117,7 @@ class KalmanResult(Result):
     Q: list[list[float]] | None
     #: Highest power of the step in the series of the transition
     order: int
-    #: Bound of what the series leaves out, each state by its range; 0 where it ends, None where no range is known
+    #: Bound of what the series leaves out, by ranges or else deviations of the states; None where an input has no range
     left_out: float | None
     observability: Observability
     gains: list[GainRow]
@@ -139,7 +139,6 @@ class KalmanResult(Result):
         bound = run_bound(model, interfaces) if interfaces else None
         formats = {one.signal.name: str(one.format) for one in interfaces[0].inputs} if interfaces else {}
         tables = {one.measurement: one for one in gain_tables.tables(model, sources[1:], target)}
-        left = model.left_out
         return KalmanResult(
             name=text.name,
             title=text.title,
@@ -168,7 +167,7 @@ class KalmanResult(Result):
             transition=_entries(model.transition) if constant else None,
             Q=_entries(model.Q) if constant else None,
             order=model.order,
-            left_out=None if left is None else float_above(left),
+            left_out=model.left_out,
             observability=model.observability,
             gains=[
                 GainRow(
@@ -207,7 +206,7 @@ class KalmanResult(Result):
             yield from _matrix("G, derivatives by the noise", names, noise, self.G)
         yield from _matrix("H", [one.name for one in self.measurements], names, self.H)
         left = "nothing" if self.left_out == 0 else "what is not bounded, for want of ranges"
-        left = f"at most {self.left_out:.2g} of the ranges" if self.left_out else left
+        left = f"at most {self.left_out:.2g} of the ranges, or deviations at first" if self.left_out else left
         about = f"a series to the power {self.order} of F T, which leaves out {left}"
         if self.transition is None or self.Q is None:
             yield ""

@@ -11,7 +11,7 @@ from strapgen.catalogue.kinematics import DCM
 from strapgen.ir.signals import CYCLE, Signal
 from strapgen.kernel.algebra import Wrapped
 from strapgen.kernel.kernel import Kernel, KernelBuilder
-from strapgen.navigation.frame.frame_rates import CURVATURE
+from strapgen.navigation.frame.frame_rates import CURVATURE, FENNER
 from strapgen.navigation.instruments.imu_errors import CYCLE as LENGTH
 
 LTR81 = (
@@ -103,6 +103,7 @@ GRADIENT = Signal.scalar(
     meaning="2 g/R, by which gravity decreases with height",
     bound=Fraction(1, 262144),
 )
+_ERROR = "height of the barometer less that of the filter"
 
 
 def _gain(name: str, unit: str, meaning: str, bound: Fraction) -> Signal:
@@ -259,6 +260,37 @@ def vertical_loop() -> Kernel:
             "Forward Euler: poles at -1/tau become 1 - T/tau, and a steady state stays exactly the same.",
             "With k3 = 0 the loop is of second order, and holds its bias.",
         ),
+    )
+
+
+def height_hysteresis() -> Kernel:
+    """Return the switch that limits the feedback of a height error, with hysteresis.
+
+    It is on after an error of a magnitude above one limit, until one is at most the other. While it is on, climb and
+    bias are left as they are, so that a step of the barometer does not enter them.
+
+    Returns: inputs ``limited``, a state, 0 or 1, ``height_error`` in m, ``above`` and ``below`` in m; output
+    ``next_limited``.
+
+    >>> height_hysteresis().outputs[0].signal.name
+    'next_limited'
+    """
+    build = KernelBuilder()
+    switch = Signal.scalar(
+        "limited", meaning="1 while the height alone is corrected, else 0", bound=Fraction(1)
+    )
+    limited = build.scalar(switch)
+    error = build.scalar(replace(HEIGHT, name="height_error", elements=("height_error",), meaning=_ERROR))
+    above, below = (
+        build.scalar(Signal.scalar(name, unit="m", meaning=f"magnitude {what}", bound=HEIGHT.bound))
+        for name, what in (("above", "above which it goes on"), ("below", "up to which it goes off"))
+    )
+    limit = build.value("limit", sp.Piecewise((below, limited >= sp.Rational(1, 2)), (above, True)))
+    build.feedback(switch, [sp.Piecewise((0, limit >= sp.Abs(error)), (1, True))])
+    return build.kernel(
+        "height-hysteresis",
+        "Hysteresis of the feedback of a height",
+        f"{FENNER}, page 4-20 names its purpose; form lost in the scans, derived",
     )
 
 

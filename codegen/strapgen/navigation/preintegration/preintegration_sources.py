@@ -16,7 +16,7 @@ from strapgen.ir.interfaces import RoundingBounds
 from strapgen.ir.program import Program
 from strapgen.ir.sources import Sources
 from strapgen.ir.version import VERSION
-from strapgen.navigation.preintegration import INPUTS, preintegrator, resampling
+from strapgen.navigation.preintegration import AWAY, FEWEST, INPUTS, INTERPOLATION, POINTS, preintegrator
 from strapgen.navigation.preintegration.preintegrator import PreintegrationStatus
 from strapgen.results.result import Result
 from strapgen.targets import c, cpp
@@ -81,8 +81,12 @@ def sources(method: str, input: str = "increments", target: str = "cpp", name: s
         raise InputError(
             f"--name is {name!r}; letters, digits and underscores are needed, a letter first, no keyword"
         )
-    step, update = f"{identifier}_step", f"{identifier}_update"
-    printed = [_function(choice, step), _function(choose(preintegrator.UPDATE), update)]
+    step, update, interpolation = (f"{identifier}_{part}" for part in ("step", "update", "interpolation"))
+    printed = [
+        _function(choice, step),
+        _function(choose(preintegrator.UPDATE), update),
+        _function(choose(INTERPOLATION[input]), interpolation),
+    ]
     program = pipeline.program(choice)
     command = ["strapgen", "preintegrate", "--window", method, "--input", input, "--target", target]
     command += [] if name is None else ["--name", name]
@@ -95,9 +99,10 @@ def sources(method: str, input: str = "increments", target: str = "cpp", name: s
         "program": program,
         "samples": samples,
         "meaning": meaning,
-        "points": resampling.POINTS,
-        "fewest": resampling.FEWEST,
-        "gauss": resampling.GAUSS,
+        "points": POINTS,
+        "fewest": FEWEST,
+        "away": AWAY,
+        "interpolation": interpolation,
         "previous": choice.previous,
         "ahead": choice.ahead,
         "count": choice.increments,

@@ -16,7 +16,7 @@ from strapgen.catalogue.methods import windows
 from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.notebook_display import Records, short_repr
-from strapgen.navigation.preintegration import INPUTS, resampling
+from strapgen.navigation.preintegration import INPUTS, INTERPOLATION, POINTS, resampling
 from strapgen.run.backends import evaluator
 from strapgen.run.evaluators import Array, Evaluator
 
@@ -210,6 +210,7 @@ class Preintegrator:
             float(checks.number(*pair)) for pair in zip(names, (rate_noise, force_noise), strict=True)
         ]
         self._step = evaluator(self._choice)
+        self._interpolation = evaluator(INTERPOLATION[input])
         assert self._choice.increments is not None
         self._count: int = self._choice.increments
         self.previous: int = self._choice.previous
@@ -313,9 +314,7 @@ class Preintegrator:
         number = self._count * max(1, int(duration / (self._nominal * self._count) + 0.5))
         length = duration / number
         low, high = -self.previous, number + self.ahead
-        reach = [
-            begin + (edge * length / _SECOND) for edge in (low - resampling.POINTS, high + resampling.POINTS)
-        ]
+        reach = [begin + (edge * length / _SECOND) for edge in (low - POINTS, high + POINTS)]
         inside = slice(*(bisect_left(self._stamps, edge) for edge in reach))
         times = np.array([(stamp - begin) * _SECOND for stamp in self._stamps[inside]]) * (1 / length)
         if len(times) < 2 or low < times[0] - SLACK or high > times[-1] + SLACK:
@@ -327,9 +326,11 @@ class Preintegrator:
         boundaries = np.arange(low, high + 1).astype(np.float64)
         samples = np.array(self._samples[inside])
         if self._input == "instants":
-            grid = resampling.of_points(times, samples, boundaries, length)
+            grid = length * resampling.interpolated(
+                self._interpolation, times, samples, boundaries[:-1] + 0.5
+            )
         else:
-            grid = resampling.of_means(times, samples, boundaries)
+            grid = resampling.increments(self._interpolation, times, samples, boundaries)
         return grid - bias * length, length
 
     def _sums(self, parts: list[tuple[Array, float]], steps: Array, lengths: Array) -> list[Array]:
