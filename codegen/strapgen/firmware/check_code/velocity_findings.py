@@ -210,7 +210,8 @@ class VelocityFindings:
         self._known["sculling_coefficients"] = shown
         self._known["sculling_ratio"] = ratio = coning_causes.ratio(known)
         one_sided = self._one_sided(turned)
-        said = one_sided or coning_causes.cause(known)
+        is_open = any(cause.startswith(NO_FAULT) for cause in self.causes)  # then the odd part says nothing
+        said = one_sided or (None if is_open else coning_causes.cause(known))
         if said:
             self.causes.append(
                 f"sculling{' ' if said.startswith('correction') else ': '}{said}".replace(
