@@ -358,7 +358,10 @@ def main() -> None:
     parser.add_argument("--backend", default="c")
     parser.add_argument("--plot", type=Path)
     options = parser.parse_args()
-    flight = fly(options.name, Case(options.runs, options.backend))
+    try:
+        flight = fly(options.name, Case(options.runs, options.backend))
+    except strapgen.InputError as error:
+        parser.error(str(error))
     inside = np.mean(np.abs(flight.errors) < QUANTILE * flight.deviations, axis=(0, 1))
     print(
         f"{flight.title}, {options.runs} runs: errors at the end, deviation by the filter, share in the band of 95 %"

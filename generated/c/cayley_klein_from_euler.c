@@ -16,24 +16,33 @@
 #include <stdint.h>
 #include <string.h>
 
-/* Whether one of some numbers is not finite, by its bits: compilers take comparisons for known. */
-static int cayley_klein_from_euler_nf_(const double *place, int count)
+/* Copies the bits of a number: compilers take comparisons with a NaN for known. */
+static void cayley_klein_from_euler_b(void *to, const void *from)
 {
+    (void)memcpy(to, from, sizeof(double));
+}
+
+/* Whether one of some numbers is not finite. */
+static int cayley_klein_from_euler_i(const double numbers[], int count)
+{
+    int found = 0;
     for (int k = 0; k < count; ++k) {
-        uint64_t bits;
-        memcpy(&bits, place + k, sizeof bits);
-        if ((bits & UINT64_C(0x7fffffffffffffff)) >= UINT64_C(0x7ff0000000000000))
-            return 1;
+        uint64_t bits = 0;
+        cayley_klein_from_euler_b(&bits, &numbers[k]);
+        if ((bits & UINT64_C(0x7fffffffffffffff)) >= UINT64_C(0x7ff0000000000000)) {
+            found = 1;
+        }
     }
-    return 0;
+    return found;
 }
 
 /* Sets numbers to NaN. */
-static void cayley_klein_from_euler_nan_(double *place, int count)
+static void cayley_klein_from_euler_n(double numbers[], int count)
 {
     const uint64_t bits = UINT64_C(0x7ff8000000000000);
-    for (int k = 0; k < count; ++k)
-        memcpy(place + k, &bits, sizeof bits);
+    for (int k = 0; k < count; ++k) {
+        cayley_klein_from_euler_b(&numbers[k], &bits);
+    }
 }
 #endif
 
@@ -41,10 +50,7 @@ static void cayley_klein_from_euler_nan_(double *place, int count)
 void cayley_klein_from_euler(const double state[4], double converted[4])
 {
 #if defined(__FAST_MATH__)
-    if (cayley_klein_from_euler_nf_(state, 4)) {
-        cayley_klein_from_euler_nan_(converted, 4);
-        return;
-    }
+    const int refused_ = cayley_klein_from_euler_i(state, 4);
 #endif
     const double e_x = state[0];
     const double e_y = state[1];
@@ -54,4 +60,9 @@ void cayley_klein_from_euler(const double state[4], double converted[4])
     converted[1] = e_x;
     converted[2] = e_y;
     converted[3] = e_z;
+#if defined(__FAST_MATH__)
+    if (refused_ != 0) {
+        cayley_klein_from_euler_n(converted, 4);
+    }
+#endif
 }

@@ -16,24 +16,33 @@
 #include <stdint.h>
 #include <string.h>
 
-/* Whether one of some numbers is not finite, by its bits: compilers take comparisons for known. */
-static int coning_fast_nf_(const double *place, int count)
+/* Copies the bits of a number: compilers take comparisons with a NaN for known. */
+static void coning_fast_b(void *to, const void *from)
 {
+    (void)memcpy(to, from, sizeof(double));
+}
+
+/* Whether one of some numbers is not finite. */
+static int coning_fast_i(const double numbers[], int count)
+{
+    int found = 0;
     for (int k = 0; k < count; ++k) {
-        uint64_t bits;
-        memcpy(&bits, place + k, sizeof bits);
-        if ((bits & UINT64_C(0x7fffffffffffffff)) >= UINT64_C(0x7ff0000000000000))
-            return 1;
+        uint64_t bits = 0;
+        coning_fast_b(&bits, &numbers[k]);
+        if ((bits & UINT64_C(0x7fffffffffffffff)) >= UINT64_C(0x7ff0000000000000)) {
+            found = 1;
+        }
     }
-    return 0;
+    return found;
 }
 
 /* Sets numbers to NaN. */
-static void coning_fast_nan_(double *place, int count)
+static void coning_fast_n(double numbers[], int count)
 {
     const uint64_t bits = UINT64_C(0x7ff8000000000000);
-    for (int k = 0; k < count; ++k)
-        memcpy(place + k, &bits, sizeof bits);
+    for (int k = 0; k < count; ++k) {
+        coning_fast_b(&numbers[k], &bits);
+    }
 }
 #endif
 
@@ -43,15 +52,10 @@ void coning_fast(const double angle_sum[3], const double coning[3],
     double next_coning[3], double next_previous_increment[3])
 {
 #if defined(__FAST_MATH__)
-    if (coning_fast_nf_(angle_sum, 3)
-        || coning_fast_nf_(coning, 3)
-        || coning_fast_nf_(previous_increment, 3)
-        || coning_fast_nf_(increment, 3)) {
-        coning_fast_nan_(next_angle_sum, 3);
-        coning_fast_nan_(next_coning, 3);
-        coning_fast_nan_(next_previous_increment, 3);
-        return;
-    }
+    const int refused_ = coning_fast_i(angle_sum, 3)
+        + coning_fast_i(coning, 3)
+        + coning_fast_i(previous_increment, 3)
+        + coning_fast_i(increment, 3);
 #endif
     const double beta_x = angle_sum[0];
     const double beta_y = angle_sum[1];
@@ -88,4 +92,11 @@ void coning_fast(const double angle_sum[3], const double coning[3],
     next_previous_increment[0] = d_x;
     next_previous_increment[1] = d_y;
     next_previous_increment[2] = d_z;
+#if defined(__FAST_MATH__)
+    if (refused_ != 0) {
+        coning_fast_n(next_angle_sum, 3);
+        coning_fast_n(next_coning, 3);
+        coning_fast_n(next_previous_increment, 3);
+    }
+#endif
 }

@@ -16,24 +16,33 @@
 #include <stdint.h>
 #include <string.h>
 
-/* Whether one of some numbers is not finite, by its bits: compilers take comparisons for known. */
-static int dcm_from_cayley_klein_nf_(const double *place, int count)
+/* Copies the bits of a number: compilers take comparisons with a NaN for known. */
+static void dcm_from_cayley_klein_b(void *to, const void *from)
 {
+    (void)memcpy(to, from, sizeof(double));
+}
+
+/* Whether one of some numbers is not finite. */
+static int dcm_from_cayley_klein_i(const double numbers[], int count)
+{
+    int found = 0;
     for (int k = 0; k < count; ++k) {
-        uint64_t bits;
-        memcpy(&bits, place + k, sizeof bits);
-        if ((bits & UINT64_C(0x7fffffffffffffff)) >= UINT64_C(0x7ff0000000000000))
-            return 1;
+        uint64_t bits = 0;
+        dcm_from_cayley_klein_b(&bits, &numbers[k]);
+        if ((bits & UINT64_C(0x7fffffffffffffff)) >= UINT64_C(0x7ff0000000000000)) {
+            found = 1;
+        }
     }
-    return 0;
+    return found;
 }
 
 /* Sets numbers to NaN. */
-static void dcm_from_cayley_klein_nan_(double *place, int count)
+static void dcm_from_cayley_klein_n(double numbers[], int count)
 {
     const uint64_t bits = UINT64_C(0x7ff8000000000000);
-    for (int k = 0; k < count; ++k)
-        memcpy(place + k, &bits, sizeof bits);
+    for (int k = 0; k < count; ++k) {
+        dcm_from_cayley_klein_b(&numbers[k], &bits);
+    }
 }
 #endif
 
@@ -41,10 +50,7 @@ static void dcm_from_cayley_klein_nan_(double *place, int count)
 void dcm_from_cayley_klein(const double state[4], double attitude[9])
 {
 #if defined(__FAST_MATH__)
-    if (dcm_from_cayley_klein_nf_(state, 4)) {
-        dcm_from_cayley_klein_nan_(attitude, 9);
-        return;
-    }
+    const int refused_ = dcm_from_cayley_klein_i(state, 4);
 #endif
     const double a_s = state[0];
     const double a_x = state[1];
@@ -83,4 +89,9 @@ void dcm_from_cayley_klein(const double state[4], double attitude[9])
     attitude[6] = C_31;
     attitude[7] = C_32;
     attitude[8] = C_33;
+#if defined(__FAST_MATH__)
+    if (refused_ != 0) {
+        dcm_from_cayley_klein_n(attitude, 9);
+    }
+#endif
 }

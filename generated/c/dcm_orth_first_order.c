@@ -16,24 +16,33 @@
 #include <stdint.h>
 #include <string.h>
 
-/* Whether one of some numbers is not finite, by its bits: compilers take comparisons for known. */
-static int dcm_orth_first_order_nf_(const double *place, int count)
+/* Copies the bits of a number: compilers take comparisons with a NaN for known. */
+static void dcm_orth_first_order_b(void *to, const void *from)
 {
+    (void)memcpy(to, from, sizeof(double));
+}
+
+/* Whether one of some numbers is not finite. */
+static int dcm_orth_first_order_i(const double numbers[], int count)
+{
+    int found = 0;
     for (int k = 0; k < count; ++k) {
-        uint64_t bits;
-        memcpy(&bits, place + k, sizeof bits);
-        if ((bits & UINT64_C(0x7fffffffffffffff)) >= UINT64_C(0x7ff0000000000000))
-            return 1;
+        uint64_t bits = 0;
+        dcm_orth_first_order_b(&bits, &numbers[k]);
+        if ((bits & UINT64_C(0x7fffffffffffffff)) >= UINT64_C(0x7ff0000000000000)) {
+            found = 1;
+        }
     }
-    return 0;
+    return found;
 }
 
 /* Sets numbers to NaN. */
-static void dcm_orth_first_order_nan_(double *place, int count)
+static void dcm_orth_first_order_n(double numbers[], int count)
 {
     const uint64_t bits = UINT64_C(0x7ff8000000000000);
-    for (int k = 0; k < count; ++k)
-        memcpy(place + k, &bits, sizeof bits);
+    for (int k = 0; k < count; ++k) {
+        dcm_orth_first_order_b(&numbers[k], &bits);
+    }
 }
 #endif
 
@@ -41,10 +50,7 @@ static void dcm_orth_first_order_nan_(double *place, int count)
 void dcm_orth_first_order(const double computed[9], double orthonormalized[9])
 {
 #if defined(__FAST_MATH__)
-    if (dcm_orth_first_order_nf_(computed, 9)) {
-        dcm_orth_first_order_nan_(orthonormalized, 9);
-        return;
-    }
+    const int refused_ = dcm_orth_first_order_i(computed, 9);
 #endif
     const double C_11 = computed[0];
     const double C_12 = computed[1];
@@ -88,4 +94,9 @@ void dcm_orth_first_order(const double computed[9], double orthonormalized[9])
     orthonormalized[6] = next_31;
     orthonormalized[7] = next_32;
     orthonormalized[8] = next_33;
+#if defined(__FAST_MATH__)
+    if (refused_ != 0) {
+        dcm_orth_first_order_n(orthonormalized, 9);
+    }
+#endif
 }

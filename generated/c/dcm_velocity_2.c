@@ -16,24 +16,33 @@
 #include <stdint.h>
 #include <string.h>
 
-/* Whether one of some numbers is not finite, by its bits: compilers take comparisons for known. */
-static int dcm_velocity_2_nf_(const double *place, int count)
+/* Copies the bits of a number: compilers take comparisons with a NaN for known. */
+static void dcm_velocity_2_b(void *to, const void *from)
 {
+    (void)memcpy(to, from, sizeof(double));
+}
+
+/* Whether one of some numbers is not finite. */
+static int dcm_velocity_2_i(const double numbers[], int count)
+{
+    int found = 0;
     for (int k = 0; k < count; ++k) {
-        uint64_t bits;
-        memcpy(&bits, place + k, sizeof bits);
-        if ((bits & UINT64_C(0x7fffffffffffffff)) >= UINT64_C(0x7ff0000000000000))
-            return 1;
+        uint64_t bits = 0;
+        dcm_velocity_2_b(&bits, &numbers[k]);
+        if ((bits & UINT64_C(0x7fffffffffffffff)) >= UINT64_C(0x7ff0000000000000)) {
+            found = 1;
+        }
     }
-    return 0;
+    return found;
 }
 
 /* Sets numbers to NaN. */
-static void dcm_velocity_2_nan_(double *place, int count)
+static void dcm_velocity_2_n(double numbers[], int count)
 {
     const uint64_t bits = UINT64_C(0x7ff8000000000000);
-    for (int k = 0; k < count; ++k)
-        memcpy(place + k, &bits, sizeof bits);
+    for (int k = 0; k < count; ++k) {
+        dcm_velocity_2_b(&numbers[k], &bits);
+    }
 }
 #endif
 
@@ -42,13 +51,10 @@ void dcm_velocity_2(const double state[9], const double velocity_sum[3], const d
     const double angle_sum[3], double transformed[3])
 {
 #if defined(__FAST_MATH__)
-    if (dcm_velocity_2_nf_(state, 9)
-        || dcm_velocity_2_nf_(velocity_sum, 3)
-        || dcm_velocity_2_nf_(sculling, 3)
-        || dcm_velocity_2_nf_(angle_sum, 3)) {
-        dcm_velocity_2_nan_(transformed, 3);
-        return;
-    }
+    const int refused_ = dcm_velocity_2_i(state, 9)
+        + dcm_velocity_2_i(velocity_sum, 3)
+        + dcm_velocity_2_i(sculling, 3)
+        + dcm_velocity_2_i(angle_sum, 3);
 #endif
     const double C_11 = state[0];
     const double C_12 = state[1];
@@ -81,4 +87,9 @@ void dcm_velocity_2(const double state[9], const double velocity_sum[3], const d
     transformed[0] = v_x;
     transformed[1] = v_y;
     transformed[2] = v_z;
+#if defined(__FAST_MATH__)
+    if (refused_ != 0) {
+        dcm_velocity_2_n(transformed, 3);
+    }
+#endif
 }

@@ -16,24 +16,33 @@
 #include <stdint.h>
 #include <string.h>
 
-/* Whether one of some numbers is not finite, by its bits: compilers take comparisons for known. */
-static int euler_product_nf_(const double *place, int count)
+/* Copies the bits of a number: compilers take comparisons with a NaN for known. */
+static void euler_product_b(void *to, const void *from)
 {
+    (void)memcpy(to, from, sizeof(double));
+}
+
+/* Whether one of some numbers is not finite. */
+static int euler_product_i(const double numbers[], int count)
+{
+    int found = 0;
     for (int k = 0; k < count; ++k) {
-        uint64_t bits;
-        memcpy(&bits, place + k, sizeof bits);
-        if ((bits & UINT64_C(0x7fffffffffffffff)) >= UINT64_C(0x7ff0000000000000))
-            return 1;
+        uint64_t bits = 0;
+        euler_product_b(&bits, &numbers[k]);
+        if ((bits & UINT64_C(0x7fffffffffffffff)) >= UINT64_C(0x7ff0000000000000)) {
+            found = 1;
+        }
     }
-    return 0;
+    return found;
 }
 
 /* Sets numbers to NaN. */
-static void euler_product_nan_(double *place, int count)
+static void euler_product_n(double numbers[], int count)
 {
     const uint64_t bits = UINT64_C(0x7ff8000000000000);
-    for (int k = 0; k < count; ++k)
-        memcpy(place + k, &bits, sizeof bits);
+    for (int k = 0; k < count; ++k) {
+        euler_product_b(&numbers[k], &bits);
+    }
 }
 #endif
 
@@ -41,11 +50,8 @@ static void euler_product_nan_(double *place, int count)
 void euler_product(const double state[4], const double transition[4], double next[4])
 {
 #if defined(__FAST_MATH__)
-    if (euler_product_nf_(state, 4)
-        || euler_product_nf_(transition, 4)) {
-        euler_product_nan_(next, 4);
-        return;
-    }
+    const int refused_ = euler_product_i(state, 4)
+        + euler_product_i(transition, 4);
 #endif
     const double e_x = state[0];
     const double e_y = state[1];
@@ -64,4 +70,9 @@ void euler_product(const double state[4], const double transition[4], double nex
     next[1] = next_y;
     next[2] = next_z;
     next[3] = next_s;
+#if defined(__FAST_MATH__)
+    if (refused_ != 0) {
+        euler_product_n(next, 4);
+    }
+#endif
 }

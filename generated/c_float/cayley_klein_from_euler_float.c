@@ -16,24 +16,33 @@
 #include <stdint.h>
 #include <string.h>
 
-/* Whether one of some numbers is not finite, by its bits: compilers take comparisons for known. */
-static int cayley_klein_from_euler_float_nf_(const float *place, int count)
+/* Copies the bits of a number: compilers take comparisons with a NaN for known. */
+static void cayley_klein_from_euler_float_b(void *to, const void *from)
 {
+    (void)memcpy(to, from, sizeof(float));
+}
+
+/* Whether one of some numbers is not finite. */
+static int cayley_klein_from_euler_float_i(const float numbers[], int count)
+{
+    int found = 0;
     for (int k = 0; k < count; ++k) {
-        uint32_t bits;
-        memcpy(&bits, place + k, sizeof bits);
-        if ((bits & UINT32_C(0x7fffffff)) >= UINT32_C(0x7f800000))
-            return 1;
+        uint32_t bits = 0;
+        cayley_klein_from_euler_float_b(&bits, &numbers[k]);
+        if ((bits & UINT32_C(0x7fffffff)) >= UINT32_C(0x7f800000)) {
+            found = 1;
+        }
     }
-    return 0;
+    return found;
 }
 
 /* Sets numbers to NaN. */
-static void cayley_klein_from_euler_float_nan_(float *place, int count)
+static void cayley_klein_from_euler_float_n(float numbers[], int count)
 {
     const uint32_t bits = UINT32_C(0x7fc00000);
-    for (int k = 0; k < count; ++k)
-        memcpy(place + k, &bits, sizeof bits);
+    for (int k = 0; k < count; ++k) {
+        cayley_klein_from_euler_float_b(&numbers[k], &bits);
+    }
 }
 #endif
 
@@ -41,10 +50,7 @@ static void cayley_klein_from_euler_float_nan_(float *place, int count)
 void cayley_klein_from_euler_float(const float state[4], float converted[4])
 {
 #if defined(__FAST_MATH__)
-    if (cayley_klein_from_euler_float_nf_(state, 4)) {
-        cayley_klein_from_euler_float_nan_(converted, 4);
-        return;
-    }
+    const int refused_ = cayley_klein_from_euler_float_i(state, 4);
 #endif
     const float e_x = state[0];
     const float e_y = state[1];
@@ -54,4 +60,9 @@ void cayley_klein_from_euler_float(const float state[4], float converted[4])
     converted[1] = e_x;
     converted[2] = e_y;
     converted[3] = e_z;
+#if defined(__FAST_MATH__)
+    if (refused_ != 0) {
+        cayley_klein_from_euler_float_n(converted, 4);
+    }
+#endif
 }

@@ -17,24 +17,33 @@
 #include <stdint.h>
 #include <string.h>
 
-/* Whether one of some numbers is not finite, by its bits: compilers take comparisons for known. */
-static int cayley_klein_rk4_2_float_nf_(const float *place, int count)
+/* Copies the bits of a number: compilers take comparisons with a NaN for known. */
+static void cayley_klein_rk4_2_float_b(void *to, const void *from)
 {
+    (void)memcpy(to, from, sizeof(float));
+}
+
+/* Whether one of some numbers is not finite. */
+static int cayley_klein_rk4_2_float_i(const float numbers[], int count)
+{
+    int found = 0;
     for (int k = 0; k < count; ++k) {
-        uint32_t bits;
-        memcpy(&bits, place + k, sizeof bits);
-        if ((bits & UINT32_C(0x7fffffff)) >= UINT32_C(0x7f800000))
-            return 1;
+        uint32_t bits = 0;
+        cayley_klein_rk4_2_float_b(&bits, &numbers[k]);
+        if ((bits & UINT32_C(0x7fffffff)) >= UINT32_C(0x7f800000)) {
+            found = 1;
+        }
     }
-    return 0;
+    return found;
 }
 
 /* Sets numbers to NaN. */
-static void cayley_klein_rk4_2_float_nan_(float *place, int count)
+static void cayley_klein_rk4_2_float_n(float numbers[], int count)
 {
     const uint32_t bits = UINT32_C(0x7fc00000);
-    for (int k = 0; k < count; ++k)
-        memcpy(place + k, &bits, sizeof bits);
+    for (int k = 0; k < count; ++k) {
+        cayley_klein_rk4_2_float_b(&numbers[k], &bits);
+    }
 }
 #endif
 
@@ -42,11 +51,8 @@ static void cayley_klein_rk4_2_float_nan_(float *place, int count)
 void cayley_klein_rk4_2_float(const float state[4], const float increments[6], float next[4])
 {
 #if defined(__FAST_MATH__)
-    if (cayley_klein_rk4_2_float_nf_(state, 4)
-        || cayley_klein_rk4_2_float_nf_(increments, 6)) {
-        cayley_klein_rk4_2_float_nan_(next, 4);
-        return;
-    }
+    const int refused_ = cayley_klein_rk4_2_float_i(state, 4)
+        + cayley_klein_rk4_2_float_i(increments, 6);
 #endif
     const float a_s = state[0];
     const float a_x = state[1];
@@ -88,4 +94,9 @@ void cayley_klein_rk4_2_float(const float state[4], const float increments[6], f
     next[1] = next_x;
     next[2] = next_y;
     next[3] = next_z;
+#if defined(__FAST_MATH__)
+    if (refused_ != 0) {
+        cayley_klein_rk4_2_float_n(next, 4);
+    }
+#endif
 }

@@ -16,24 +16,33 @@
 #include <stdint.h>
 #include <string.h>
 
-/* Whether one of some numbers is not finite, by its bits: compilers take comparisons for known. */
-static int coning_fast_float_nf_(const float *place, int count)
+/* Copies the bits of a number: compilers take comparisons with a NaN for known. */
+static void coning_fast_float_b(void *to, const void *from)
 {
+    (void)memcpy(to, from, sizeof(float));
+}
+
+/* Whether one of some numbers is not finite. */
+static int coning_fast_float_i(const float numbers[], int count)
+{
+    int found = 0;
     for (int k = 0; k < count; ++k) {
-        uint32_t bits;
-        memcpy(&bits, place + k, sizeof bits);
-        if ((bits & UINT32_C(0x7fffffff)) >= UINT32_C(0x7f800000))
-            return 1;
+        uint32_t bits = 0;
+        coning_fast_float_b(&bits, &numbers[k]);
+        if ((bits & UINT32_C(0x7fffffff)) >= UINT32_C(0x7f800000)) {
+            found = 1;
+        }
     }
-    return 0;
+    return found;
 }
 
 /* Sets numbers to NaN. */
-static void coning_fast_float_nan_(float *place, int count)
+static void coning_fast_float_n(float numbers[], int count)
 {
     const uint32_t bits = UINT32_C(0x7fc00000);
-    for (int k = 0; k < count; ++k)
-        memcpy(place + k, &bits, sizeof bits);
+    for (int k = 0; k < count; ++k) {
+        coning_fast_float_b(&numbers[k], &bits);
+    }
 }
 #endif
 
@@ -43,15 +52,10 @@ void coning_fast_float(const float angle_sum[3], const float coning[3],
     float next_coning[3], float next_previous_increment[3])
 {
 #if defined(__FAST_MATH__)
-    if (coning_fast_float_nf_(angle_sum, 3)
-        || coning_fast_float_nf_(coning, 3)
-        || coning_fast_float_nf_(previous_increment, 3)
-        || coning_fast_float_nf_(increment, 3)) {
-        coning_fast_float_nan_(next_angle_sum, 3);
-        coning_fast_float_nan_(next_coning, 3);
-        coning_fast_float_nan_(next_previous_increment, 3);
-        return;
-    }
+    const int refused_ = coning_fast_float_i(angle_sum, 3)
+        + coning_fast_float_i(coning, 3)
+        + coning_fast_float_i(previous_increment, 3)
+        + coning_fast_float_i(increment, 3);
 #endif
     const float beta_x = angle_sum[0];
     const float beta_y = angle_sum[1];
@@ -88,4 +92,11 @@ void coning_fast_float(const float angle_sum[3], const float coning[3],
     next_previous_increment[0] = d_x;
     next_previous_increment[1] = d_y;
     next_previous_increment[2] = d_z;
+#if defined(__FAST_MATH__)
+    if (refused_ != 0) {
+        coning_fast_float_n(next_angle_sum, 3);
+        coning_fast_float_n(next_coning, 3);
+        coning_fast_float_n(next_previous_increment, 3);
+    }
+#endif
 }

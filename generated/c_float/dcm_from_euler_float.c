@@ -16,24 +16,33 @@
 #include <stdint.h>
 #include <string.h>
 
-/* Whether one of some numbers is not finite, by its bits: compilers take comparisons for known. */
-static int dcm_from_euler_float_nf_(const float *place, int count)
+/* Copies the bits of a number: compilers take comparisons with a NaN for known. */
+static void dcm_from_euler_float_b(void *to, const void *from)
 {
+    (void)memcpy(to, from, sizeof(float));
+}
+
+/* Whether one of some numbers is not finite. */
+static int dcm_from_euler_float_i(const float numbers[], int count)
+{
+    int found = 0;
     for (int k = 0; k < count; ++k) {
-        uint32_t bits;
-        memcpy(&bits, place + k, sizeof bits);
-        if ((bits & UINT32_C(0x7fffffff)) >= UINT32_C(0x7f800000))
-            return 1;
+        uint32_t bits = 0;
+        dcm_from_euler_float_b(&bits, &numbers[k]);
+        if ((bits & UINT32_C(0x7fffffff)) >= UINT32_C(0x7f800000)) {
+            found = 1;
+        }
     }
-    return 0;
+    return found;
 }
 
 /* Sets numbers to NaN. */
-static void dcm_from_euler_float_nan_(float *place, int count)
+static void dcm_from_euler_float_n(float numbers[], int count)
 {
     const uint32_t bits = UINT32_C(0x7fc00000);
-    for (int k = 0; k < count; ++k)
-        memcpy(place + k, &bits, sizeof bits);
+    for (int k = 0; k < count; ++k) {
+        dcm_from_euler_float_b(&numbers[k], &bits);
+    }
 }
 #endif
 
@@ -41,10 +50,7 @@ static void dcm_from_euler_float_nan_(float *place, int count)
 void dcm_from_euler_float(const float state[4], float attitude[9])
 {
 #if defined(__FAST_MATH__)
-    if (dcm_from_euler_float_nf_(state, 4)) {
-        dcm_from_euler_float_nan_(attitude, 9);
-        return;
-    }
+    const int refused_ = dcm_from_euler_float_i(state, 4);
 #endif
     const float e_x = state[0];
     const float e_y = state[1];
@@ -83,4 +89,9 @@ void dcm_from_euler_float(const float state[4], float attitude[9])
     attitude[6] = C_31;
     attitude[7] = C_32;
     attitude[8] = C_33;
+#if defined(__FAST_MATH__)
+    if (refused_ != 0) {
+        dcm_from_euler_float_n(attitude, 9);
+    }
+#endif
 }

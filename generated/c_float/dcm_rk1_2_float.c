@@ -16,24 +16,33 @@
 #include <stdint.h>
 #include <string.h>
 
-/* Whether one of some numbers is not finite, by its bits: compilers take comparisons for known. */
-static int dcm_rk1_2_float_nf_(const float *place, int count)
+/* Copies the bits of a number: compilers take comparisons with a NaN for known. */
+static void dcm_rk1_2_float_b(void *to, const void *from)
 {
+    (void)memcpy(to, from, sizeof(float));
+}
+
+/* Whether one of some numbers is not finite. */
+static int dcm_rk1_2_float_i(const float numbers[], int count)
+{
+    int found = 0;
     for (int k = 0; k < count; ++k) {
-        uint32_t bits;
-        memcpy(&bits, place + k, sizeof bits);
-        if ((bits & UINT32_C(0x7fffffff)) >= UINT32_C(0x7f800000))
-            return 1;
+        uint32_t bits = 0;
+        dcm_rk1_2_float_b(&bits, &numbers[k]);
+        if ((bits & UINT32_C(0x7fffffff)) >= UINT32_C(0x7f800000)) {
+            found = 1;
+        }
     }
-    return 0;
+    return found;
 }
 
 /* Sets numbers to NaN. */
-static void dcm_rk1_2_float_nan_(float *place, int count)
+static void dcm_rk1_2_float_n(float numbers[], int count)
 {
     const uint32_t bits = UINT32_C(0x7fc00000);
-    for (int k = 0; k < count; ++k)
-        memcpy(place + k, &bits, sizeof bits);
+    for (int k = 0; k < count; ++k) {
+        dcm_rk1_2_float_b(&numbers[k], &bits);
+    }
 }
 #endif
 
@@ -41,11 +50,8 @@ static void dcm_rk1_2_float_nan_(float *place, int count)
 void dcm_rk1_2_float(const float state[9], const float increments[6], float next[9])
 {
 #if defined(__FAST_MATH__)
-    if (dcm_rk1_2_float_nf_(state, 9)
-        || dcm_rk1_2_float_nf_(increments, 6)) {
-        dcm_rk1_2_float_nan_(next, 9);
-        return;
-    }
+    const int refused_ = dcm_rk1_2_float_i(state, 9)
+        + dcm_rk1_2_float_i(increments, 6);
 #endif
     const float C_11 = state[0];
     const float C_12 = state[1];
@@ -89,4 +95,9 @@ void dcm_rk1_2_float(const float state[9], const float increments[6], float next
     next[6] = next_31;
     next[7] = next_32;
     next[8] = next_33;
+#if defined(__FAST_MATH__)
+    if (refused_ != 0) {
+        dcm_rk1_2_float_n(next, 9);
+    }
+#endif
 }

@@ -16,24 +16,33 @@
 #include <stdint.h>
 #include <string.h>
 
-/* Whether one of some numbers is not finite, by its bits: compilers take comparisons for known. */
-static int error_matrix_float_nf_(const float *place, int count)
+/* Copies the bits of a number: compilers take comparisons with a NaN for known. */
+static void error_matrix_float_b(void *to, const void *from)
 {
+    (void)memcpy(to, from, sizeof(float));
+}
+
+/* Whether one of some numbers is not finite. */
+static int error_matrix_float_i(const float numbers[], int count)
+{
+    int found = 0;
     for (int k = 0; k < count; ++k) {
-        uint32_t bits;
-        memcpy(&bits, place + k, sizeof bits);
-        if ((bits & UINT32_C(0x7fffffff)) >= UINT32_C(0x7f800000))
-            return 1;
+        uint32_t bits = 0;
+        error_matrix_float_b(&bits, &numbers[k]);
+        if ((bits & UINT32_C(0x7fffffff)) >= UINT32_C(0x7f800000)) {
+            found = 1;
+        }
     }
-    return 0;
+    return found;
 }
 
 /* Sets numbers to NaN. */
-static void error_matrix_float_nan_(float *place, int count)
+static void error_matrix_float_n(float numbers[], int count)
 {
     const uint32_t bits = UINT32_C(0x7fc00000);
-    for (int k = 0; k < count; ++k)
-        memcpy(place + k, &bits, sizeof bits);
+    for (int k = 0; k < count; ++k) {
+        error_matrix_float_b(&numbers[k], &bits);
+    }
 }
 #endif
 
@@ -42,14 +51,8 @@ void error_matrix_float(const float computed[9], const float truth[9], float err
     float scale[3], float skew[3], float drift[3])
 {
 #if defined(__FAST_MATH__)
-    if (error_matrix_float_nf_(computed, 9)
-        || error_matrix_float_nf_(truth, 9)) {
-        error_matrix_float_nan_(error, 9);
-        error_matrix_float_nan_(scale, 3);
-        error_matrix_float_nan_(skew, 3);
-        error_matrix_float_nan_(drift, 3);
-        return;
-    }
+    const int refused_ = error_matrix_float_i(computed, 9)
+        + error_matrix_float_i(truth, 9);
 #endif
     const float C_11 = computed[0];
     const float C_12 = computed[1];
@@ -111,4 +114,12 @@ void error_matrix_float(const float computed[9], const float truth[9], float err
     drift[0] = drift_x;
     drift[1] = drift_y;
     drift[2] = drift_z;
+#if defined(__FAST_MATH__)
+    if (refused_ != 0) {
+        error_matrix_float_n(error, 9);
+        error_matrix_float_n(scale, 3);
+        error_matrix_float_n(skew, 3);
+        error_matrix_float_n(drift, 3);
+    }
+#endif
 }

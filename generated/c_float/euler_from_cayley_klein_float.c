@@ -16,24 +16,33 @@
 #include <stdint.h>
 #include <string.h>
 
-/* Whether one of some numbers is not finite, by its bits: compilers take comparisons for known. */
-static int euler_from_cayley_klein_float_nf_(const float *place, int count)
+/* Copies the bits of a number: compilers take comparisons with a NaN for known. */
+static void euler_from_cayley_klein_float_b(void *to, const void *from)
 {
+    (void)memcpy(to, from, sizeof(float));
+}
+
+/* Whether one of some numbers is not finite. */
+static int euler_from_cayley_klein_float_i(const float numbers[], int count)
+{
+    int found = 0;
     for (int k = 0; k < count; ++k) {
-        uint32_t bits;
-        memcpy(&bits, place + k, sizeof bits);
-        if ((bits & UINT32_C(0x7fffffff)) >= UINT32_C(0x7f800000))
-            return 1;
+        uint32_t bits = 0;
+        euler_from_cayley_klein_float_b(&bits, &numbers[k]);
+        if ((bits & UINT32_C(0x7fffffff)) >= UINT32_C(0x7f800000)) {
+            found = 1;
+        }
     }
-    return 0;
+    return found;
 }
 
 /* Sets numbers to NaN. */
-static void euler_from_cayley_klein_float_nan_(float *place, int count)
+static void euler_from_cayley_klein_float_n(float numbers[], int count)
 {
     const uint32_t bits = UINT32_C(0x7fc00000);
-    for (int k = 0; k < count; ++k)
-        memcpy(place + k, &bits, sizeof bits);
+    for (int k = 0; k < count; ++k) {
+        euler_from_cayley_klein_float_b(&numbers[k], &bits);
+    }
 }
 #endif
 
@@ -41,10 +50,7 @@ static void euler_from_cayley_klein_float_nan_(float *place, int count)
 void euler_from_cayley_klein_float(const float state[4], float converted[4])
 {
 #if defined(__FAST_MATH__)
-    if (euler_from_cayley_klein_float_nf_(state, 4)) {
-        euler_from_cayley_klein_float_nan_(converted, 4);
-        return;
-    }
+    const int refused_ = euler_from_cayley_klein_float_i(state, 4);
 #endif
     const float a_s = state[0];
     const float a_x = state[1];
@@ -54,4 +60,9 @@ void euler_from_cayley_klein_float(const float state[4], float converted[4])
     converted[1] = a_y;
     converted[2] = a_z;
     converted[3] = a_s;
+#if defined(__FAST_MATH__)
+    if (refused_ != 0) {
+        euler_from_cayley_klein_float_n(converted, 4);
+    }
+#endif
 }

@@ -16,24 +16,33 @@
 #include <stdint.h>
 #include <string.h>
 
-/* Whether one of some numbers is not finite, by its bits: compilers take comparisons for known. */
-static int euler_rk1_2_float_nf_(const float *place, int count)
+/* Copies the bits of a number: compilers take comparisons with a NaN for known. */
+static void euler_rk1_2_float_b(void *to, const void *from)
 {
+    (void)memcpy(to, from, sizeof(float));
+}
+
+/* Whether one of some numbers is not finite. */
+static int euler_rk1_2_float_i(const float numbers[], int count)
+{
+    int found = 0;
     for (int k = 0; k < count; ++k) {
-        uint32_t bits;
-        memcpy(&bits, place + k, sizeof bits);
-        if ((bits & UINT32_C(0x7fffffff)) >= UINT32_C(0x7f800000))
-            return 1;
+        uint32_t bits = 0;
+        euler_rk1_2_float_b(&bits, &numbers[k]);
+        if ((bits & UINT32_C(0x7fffffff)) >= UINT32_C(0x7f800000)) {
+            found = 1;
+        }
     }
-    return 0;
+    return found;
 }
 
 /* Sets numbers to NaN. */
-static void euler_rk1_2_float_nan_(float *place, int count)
+static void euler_rk1_2_float_n(float numbers[], int count)
 {
     const uint32_t bits = UINT32_C(0x7fc00000);
-    for (int k = 0; k < count; ++k)
-        memcpy(place + k, &bits, sizeof bits);
+    for (int k = 0; k < count; ++k) {
+        euler_rk1_2_float_b(&numbers[k], &bits);
+    }
 }
 #endif
 
@@ -41,11 +50,8 @@ static void euler_rk1_2_float_nan_(float *place, int count)
 void euler_rk1_2_float(const float state[4], const float increments[6], float next[4])
 {
 #if defined(__FAST_MATH__)
-    if (euler_rk1_2_float_nf_(state, 4)
-        || euler_rk1_2_float_nf_(increments, 6)) {
-        euler_rk1_2_float_nan_(next, 4);
-        return;
-    }
+    const int refused_ = euler_rk1_2_float_i(state, 4)
+        + euler_rk1_2_float_i(increments, 6);
 #endif
     const float e_x = state[0];
     const float e_y = state[1];
@@ -70,4 +76,9 @@ void euler_rk1_2_float(const float state[4], const float increments[6], float ne
     next[1] = next_y;
     next[2] = next_z;
     next[3] = next_s;
+#if defined(__FAST_MATH__)
+    if (refused_ != 0) {
+        euler_rk1_2_float_n(next, 4);
+    }
+#endif
 }

@@ -16,24 +16,33 @@
 #include <stdint.h>
 #include <string.h>
 
-/* Whether one of some numbers is not finite, by its bits: compilers take comparisons for known. */
-static int sculling_fast_2_float_nf_(const float *place, int count)
+/* Copies the bits of a number: compilers take comparisons with a NaN for known. */
+static void sculling_fast_2_float_b(void *to, const void *from)
 {
+    (void)memcpy(to, from, sizeof(float));
+}
+
+/* Whether one of some numbers is not finite. */
+static int sculling_fast_2_float_i(const float numbers[], int count)
+{
+    int found = 0;
     for (int k = 0; k < count; ++k) {
-        uint32_t bits;
-        memcpy(&bits, place + k, sizeof bits);
-        if ((bits & UINT32_C(0x7fffffff)) >= UINT32_C(0x7f800000))
-            return 1;
+        uint32_t bits = 0;
+        sculling_fast_2_float_b(&bits, &numbers[k]);
+        if ((bits & UINT32_C(0x7fffffff)) >= UINT32_C(0x7f800000)) {
+            found = 1;
+        }
     }
-    return 0;
+    return found;
 }
 
 /* Sets numbers to NaN. */
-static void sculling_fast_2_float_nan_(float *place, int count)
+static void sculling_fast_2_float_n(float numbers[], int count)
 {
     const uint32_t bits = UINT32_C(0x7fc00000);
-    for (int k = 0; k < count; ++k)
-        memcpy(place + k, &bits, sizeof bits);
+    for (int k = 0; k < count; ++k) {
+        sculling_fast_2_float_b(&numbers[k], &bits);
+    }
 }
 #endif
 
@@ -43,16 +52,11 @@ void sculling_fast_2_float(const float angle_sum[3], const float velocity_sum[3]
     float next_angle_sum[3], float next_velocity_sum[3], float next_sculling[3])
 {
 #if defined(__FAST_MATH__)
-    if (sculling_fast_2_float_nf_(angle_sum, 3)
-        || sculling_fast_2_float_nf_(velocity_sum, 3)
-        || sculling_fast_2_float_nf_(sculling, 3)
-        || sculling_fast_2_float_nf_(increment, 3)
-        || sculling_fast_2_float_nf_(velocity_increment, 3)) {
-        sculling_fast_2_float_nan_(next_angle_sum, 3);
-        sculling_fast_2_float_nan_(next_velocity_sum, 3);
-        sculling_fast_2_float_nan_(next_sculling, 3);
-        return;
-    }
+    const int refused_ = sculling_fast_2_float_i(angle_sum, 3)
+        + sculling_fast_2_float_i(velocity_sum, 3)
+        + sculling_fast_2_float_i(sculling, 3)
+        + sculling_fast_2_float_i(increment, 3)
+        + sculling_fast_2_float_i(velocity_increment, 3);
 #endif
     const float beta_x = angle_sum[0];
     const float beta_y = angle_sum[1];
@@ -93,4 +97,11 @@ void sculling_fast_2_float(const float angle_sum[3], const float velocity_sum[3]
     next_sculling[0] = next_eta_x;
     next_sculling[1] = next_eta_y;
     next_sculling[2] = next_eta_z;
+#if defined(__FAST_MATH__)
+    if (refused_ != 0) {
+        sculling_fast_2_float_n(next_angle_sum, 3);
+        sculling_fast_2_float_n(next_velocity_sum, 3);
+        sculling_fast_2_float_n(next_sculling, 3);
+    }
+#endif
 }

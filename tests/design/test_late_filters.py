@@ -13,7 +13,6 @@ from strapgen.catalogue.methods.sensor_response import Response
 from strapgen.catalogue.methods.windows import WINDOWS, with_exact_rotation
 from strapgen.design.commit_late.late_filters import (
     NEXT,
-    POINTS,
     REACH,
     SHORT,
     WEIGHT,
@@ -22,6 +21,7 @@ from strapgen.design.commit_late.late_filters import (
     restoration,
     short_place,
 )
+from strapgen.design.filters.band_grid import MEAN_POINTS
 from strapgen.ir.exceptions import InputError
 
 WINDOW = WINDOWS["window-7-7"]
@@ -119,7 +119,7 @@ def test_no_filter_near_it_has_a_smaller_sum_of_squares(which, gyro):
     window = replace(WINDOW, gyro=gyro)
     taps = np.array([float(tap) for tap in getattr(restoration(window), which)])
     band = float(window.band)
-    frequencies = band * np.cos(np.pi * (np.arange(POINTS) + 0.5) / (2 * POINTS))
+    frequencies = band * np.cos(np.pi * (np.arange(MEAN_POINTS) + 0.5) / (2 * MEAN_POINTS))
     shown = np.sinc(frequencies / (2 * np.pi))
     if gyro is not None:
         ratio = frequencies * 100 / (2 * np.pi * 10)

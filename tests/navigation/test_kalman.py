@@ -5,6 +5,8 @@ from __future__ import annotations
 import csv
 import json
 import re
+import subprocess
+import sys
 import tomllib
 from dataclasses import replace
 from decimal import Decimal
@@ -496,6 +498,42 @@ def test_the_tables_of_a_schedule_hold_its_gains(tmp_path, capsys):
             assert 0 < worst <= Fraction(words[4]) < worst * Fraction(102, 100)
         assert all(rows[7][1 + place] in head for place in range(3))
         assert command_of(head).startswith(f"strapgen kalman {EXAMPLE} --target {target}") or ending == "m"
+
+
+@pytest.mark.needs("cmake", "cc")
+@pytest.mark.parametrize("words", [("c-fixed", "scheduled"), ("c", "online")])
+def test_a_project_builds_and_its_vectors_hold(words, tmp_path, capsys):
+    target, kind = words
+    (tmp_path / "gyro.toml").write_text(EXAMPLE.read_text().replace('"scheduled"', f'"{kind}"'))
+    line = [
+        "kalman",
+        str(tmp_path / "gyro.toml"),
+        "--target",
+        target,
+        "--project",
+        "--out",
+        str(tmp_path / "out"),
+    ]
+    status, _, err = says(line, capsys)
+    assert (status, err) == (0, "")
+    for command in ("cmake -S . -B b", "cmake --build b", "ctest --test-dir b"):
+        made = subprocess.run(command.split(), cwd=tmp_path / "out", capture_output=True, text=True)
+        assert made.returncode == 0, made.stdout + made.stderr
+    assert "100% tests passed out of 4" in made.stdout.replace(", 0 tests failed", "")
+
+
+@pytest.mark.parametrize("kind", ["zephyr", "esp-idf", "platformio", "arduino", "python", "fmu2"])
+def test_other_kinds_of_projects(kind, tmp_path, capsys):
+    line = ["kalman", str(EXAMPLE), "--target", "c-fixed", "--project", kind, "--out", str(tmp_path / "out")]
+    status, out, err = says(line, capsys)
+    if kind == "fmu2":
+        assert (status, err.count("\n")) == (2, 1) and "goes with generate, two-speed and system" in err
+    else:
+        assert (status, err) == (0, "") and "gyrocompass_force_north_gains.csv" in out
+    if kind == "python":
+        build = [sys.executable, "-c", "from build_extension import ffi; ffi.compile()"]
+        made = subprocess.run(build, cwd=tmp_path / "out", capture_output=True, text=True)
+        assert made.returncode == 0, made.stderr
 
 
 def test_the_command_says_what_the_object_has(capsys):

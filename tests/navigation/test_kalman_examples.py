@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import sys
 from functools import cache
 from pathlib import Path
@@ -14,7 +15,8 @@ from scipy.stats import chi2
 import strapgen
 from strapgen.lab.sensor_errors.instruments import InstrumentErrors, TriadErrors
 
-FOLDER = Path(__file__).resolve().parents[2] / "examples" / "kalman"
+DOCS = Path(__file__).resolve().parents[2] / "docs"
+FOLDER = DOCS.parent / "examples" / "kalman"
 sys.path.insert(0, str(FOLDER))
 
 import flights  # noqa: E402
@@ -142,8 +144,10 @@ def assert_consistent(flight: Flight, times: slice = slice(None)) -> None:
 def test_two_hundred_flights_with_satellites_are_as_wrong_as_the_filter_says():
     flight = fly("gnss", Case(200))
     assert_consistent(flight)
-    low, high = nees_band(15, 200)
-    assert low < flight.nees[:, -1].mean() < high
+    (low, high), mean = nees_band(15, 200), flight.nees[:, -1].mean()
+    assert low < mean < high
+    said = f"squared error is {mean:.1f} at the end; 95 % of such means lie between {low:.1f} and {high:.1f}."
+    assert said in " ".join((DOCS / "kalman.md").read_text().split())
     assert (flight.deviations[0, -1, :3] < np.degrees(2e-3)).all()
 
 
@@ -252,11 +256,37 @@ def test_numpy_and_c_fly_the_same(name):
     np.testing.assert_allclose(one.errors, other.errors, atol=1e-9)
 
 
+@pytest.mark.long
+def test_in_single_precision_factors_keep_more_digits_than_a_covariance():
+    largest = {}
+    for form in ("ud", "joseph"):
+        one, other = (flights.gnss(model("gnss", form), Case(2, backend)) for backend in ("c", "c-float"))
+        largest[form] = (np.abs(one.errors - other.errors) / one.deviations).max()
+    assert largest["ud"] < 1e-4
+    assert 2 * largest["ud"] < largest["joseph"] < 1e-3
+
+
 @pytest.mark.parametrize("name", ["baro-inertial", pytest.param("fine-alignment", marks=pytest.mark.long)])
 def test_in_words_of_32_bits_it_flies_as_in_double(name):
     one, other = (fly(name, Case(2, backend)) for backend in ("c", "c-fixed32"))
     difference = np.abs(one.errors - other.errors) / one.deviations
     assert 0 < difference.max() < 0.02
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("name", flights.FLIGHTS)
+def test_pictures_of_the_page_are_those_of_the_script(name, tmp_path, monkeypatch):
+    """If this fails, run python examples/kalman/flights.py NAME --plot docs/kalman-NAME.svg."""
+    drawn = tmp_path / f"kalman-{name}.svg"
+    monkeypatch.setattr("sys.argv", ["flights.py", name, "--plot", str(drawn)])
+    flights.main()
+    number = r"-?\d+(?:\.\d+)?(?:e-?\d+)?"
+    texts = [
+        re.sub(r'(?:url\(#|id=")p[0-9a-f]{10}', "", path.read_text()) for path in (drawn, DOCS / drawn.name)
+    ]
+    ours, theirs = (np.array(re.findall(number, text), float) for text in texts)
+    assert re.sub(number, "#", texts[0]) == re.sub(number, "#", texts[1])
+    np.testing.assert_allclose(ours, theirs, rtol=0, atol=0.5)
 
 
 def test_the_script_flies_and_draws(tmp_path, monkeypatch, capsys):

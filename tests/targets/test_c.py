@@ -575,7 +575,9 @@ class Counter(c_ast.NodeVisitor):
 
 
 def function_body(source: str) -> str:
-    code = re.sub(r"/\*.*?\*/", "", source, flags=re.DOTALL)
+    code = re.sub(
+        r"/\*.*?\*/|^#if defined\(__FAST_MATH__\).*?^#endif", "", source, flags=re.DOTALL | re.MULTILINE
+    )
     (body,) = re.findall(r"^(void \w+\(.*?^\})", code, flags=re.DOTALL | re.MULTILINE)
     return body
 

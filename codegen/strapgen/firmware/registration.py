@@ -36,6 +36,7 @@ REGISTRATION = Registration(
         "lab.source-files": f"{__package__}:header_command",
         "navigation.source-files": f"{__package__}.header_command:runner_of_file",
         "two-speed.project": f"{__package__}:two_speed_project",
+        "kalman.project": f"{__package__}:kalman_project",
         "whole.project": f"{__package__}:whole_project",
     },
     requires=("lab", "navigation", "design", "stamped"),

@@ -5,9 +5,9 @@ window takes, at the beginning of a recording, polynomials through up to four of
 
 Other filters restore a lost sample from those on both sides of it, with or without the sum of it and the next one. The
 rate has no frequency above the band of a window, so that a lost increment follows from its neighbours. The filter f
-makes the sum over `POINTS` frequencies b of the band of |A_0(b)|^2 |sum_j f_j e^(ijb) - 1|^2 least, A_0 what a sample
-shows of the rate e^(ibt), with a small weight of the squares of the taps. Their sum is 1, so that a constant rate is
-restored exactly. In 50 digits the taps come out alike on every machine; they are rounded to multiples of 2^-60.
+makes the mean over the band of |A_0(b)|^2 |sum_j f_j e^(ijb) - 1|^2 least, A_0 what a sample shows of the rate e^(ibt),
+with a small weight of the squares of the taps. Their sum is 1, so that a constant rate is restored exactly. In the
+digits of `band_grid` the taps come out alike on every machine; they are rounded to multiples of 2^-60.
 """
 
 from __future__ import annotations
@@ -16,15 +16,17 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import cached_property, lru_cache
+from operator import mul
 from typing import Any, NamedTuple
-
-from mpmath.ctx_mp import MPContext
 
 from strapgen.catalogue.kernels.kernel_names import EXACT_DEGREES, LEGENDRE_DEGREES
 from strapgen.catalogue.methods import window_conditions
-from strapgen.catalogue.methods.sensor_response import PI, Response
+from strapgen.catalogue.methods.sensor_response import Response
 from strapgen.catalogue.methods.window import Taps, Window
 from strapgen.catalogue.methods.windows import EXACT_TERMS
+from strapgen.design.filters.band_grid import BITS, REAL, mean_grid, real
+from strapgen.design.filters.filter_taps import TABLE_BITS, nearest
+from strapgen.design.filters.mean_square import solve
 from strapgen.ir.exceptions import InputError
 
 #: Most samples that a polynomial goes through.
@@ -157,22 +159,8 @@ def polynomial(count: int, place: int, degree: int) -> Rows:
 
 #: Samples on each side of a lost one that restore it.
 REACH = 8
-#: Frequencies of the band over which the error is least in the mean, and the weight of the squares of the taps.
-POINTS, WEIGHT = 400, Fraction(1, 10**16)
-#: Binary digits of the taps behind the point.
-_BITS = 60
-
-_REAL = MPContext()
-_REAL.dps = 50
-
-
-# Filters that restore a lost sample from those on both sides of it, with or without the sum of it and the next one.
-#
-# The rate has no frequency above the band of a window, so that its increments are not independent: a lost one follows
-# from its neighbours within the band. The filter f makes the sum over `POINTS` frequencies b of the band of
-# |A_0(b)|^2 |sum_j f_j e^(ijb) - 1|^2 least, A_0 what a sample shows of the rate e^(ibt), with a small weight of the
-# squares of the taps. Their sum is 1, so that a constant rate is restored exactly. In 50 digits the taps come out alike
-# on every machine; they are rounded to multiples of 2^-60.
+#: Weight of the squares of the taps.
+WEIGHT = Fraction(1, 10**16)
 
 
 class Restoration(NamedTuple):
@@ -197,11 +185,9 @@ def restoration(window: Window) -> Restoration:
 
 @lru_cache(maxsize=8)
 def _restoration(band: Fraction, gyro: Response | None) -> Restoration:
-    points = [
-        _number(band) * _REAL.cos(_REAL.pi * (2 * k + 1) / (4 * POINTS)) for k in range(POINTS)
-    ]  # b = band cos(pi (k + 1/2) / 800)
-    squares = [_square(b, gyro) for b in points]
-    lags = [_REAL.fdot(squares, [_REAL.cos(lag * b) for b in points]) for lag in range(2 * REACH + 1)]
+    grid = mean_grid(band, 2 * REACH, gyro)
+    squares = grid.squares()
+    lags = [real(sum(map(mul, squares, column)) >> BITS) for column in zip(*grid.lags, strict=True)]
     outer = [(j,) for j in range(-REACH, REACH + 1) if j not in (0, 1)]
     return Restoration(_taps(lags, [(-j, j) for j in range(1, REACH + 1)]), _taps(lags, [*outer, (0, 1)]))
 
@@ -213,38 +199,24 @@ def _taps(lags: Sequence[Any], groups: Sequence[tuple[int, ...]]) -> Taps:
     """
 
     def product(group: Sequence[int], other: Sequence[int]) -> Any:
-        return _REAL.fsum(lags[abs(i - j)] for i in group for j in other)
+        return sum((lags[abs(i - j)] for i in group for j in other), REAL.mpf(0))
 
-    count = len(groups)
-    matrix, right = _REAL.zeros(count + 1), _REAL.zeros(count + 1, 1)
-    for row, group in enumerate(groups):
-        for column, other in enumerate(groups):
-            matrix[row, column] = product(group, other)
-        matrix[row, row] += _number(WEIGHT) * len(group)
-        matrix[row, count] = matrix[count, row] = len(group)
-        right[row] = product(group, (0,))
-    right[count] = 1
-    solution = _REAL.lu_solve(matrix, right)
-    taps = [Fraction(int(_REAL.nint(_REAL.ldexp(solution[row], _BITS))), 1 << _BITS) for row in range(count)]
+    lengths = [REAL.mpf(len(group)) for group in groups]
+    matrix = [
+        [*(product(group, other) for other in groups), length]
+        for group, length in zip(groups, lengths, strict=True)
+    ]
+    for row, length in enumerate(lengths):
+        matrix[row][row] += length * WEIGHT.numerator / WEIGHT.denominator
+    right = [*(product(group, (0,)) for group in groups), REAL.mpf(1)]
+    (solution,) = solve([*matrix, [*lengths, REAL.mpf(0)]], [right])
+    taps = [nearest(value, TABLE_BITS) for value in solution[:-1]]
     # The largest tap takes up the rounding of the sum, a few units.
-    largest = max(range(count), key=lambda row: abs(taps[row]))
+    largest = max(range(len(taps)), key=lambda row: abs(taps[row]))
     rest = sum((len(group) * tap for group, tap in zip(groups, taps, strict=True)), Fraction(0))
     taps[largest] += (1 - rest) / len(groups[largest])
     by_sample = {j: tap for group, tap in zip(groups, taps, strict=True) for j in group}
     return tuple(by_sample.get(j, Fraction(0)) for j in range(-REACH, REACH + 1))
-
-
-def _square(b: Any, gyro: Response | None) -> Any:
-    """Return |A_0|^2 at an angular frequency in rad a sample."""
-    square = (_REAL.sin(b / 2) / (b / 2)) ** 2
-    if gyro is None:
-        return square
-    assert gyro.sample_hz is not None, "a window's has it"
-    return square * abs(gyro.gain(b * _number(gyro.sample_hz / (2 * PI)), _REAL)) ** 2
-
-
-def _number(value: Fraction) -> Any:
-    return _REAL.mpf(value.numerator) / value.denominator
 
 
 #: Taps as integers.

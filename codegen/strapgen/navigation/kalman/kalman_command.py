@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
@@ -18,7 +19,7 @@ from strapgen.ir.exceptions import InputError
 
 
 @grouped
-@rules(Needs("--check --force", "--out"))
+@rules(Needs("--project --check --force", "--out"))
 def kalman(
     file: Annotated[
         Path,
@@ -51,7 +52,7 @@ def kalman(
     ] = None,
     fixed: Annotated[FixedOptions, Shown(only=("word", "rounding", "carry", "allowance", "formats"))],
     out: NewFolder = None,
-    output: Annotated[SourceOptions, Shown(only=("check", "force"))],
+    output: Annotated[SourceOptions, Shown(only=("project", "check", "force"))],
     format: Format = "text",
 ) -> None:
     """Generate a Kalman filter from its description.
@@ -79,12 +80,16 @@ def kalman(
     with waiting("deriving"):
         model = read(file, form)
         sources = model.sources(target, settings)
-    place = SourceOptions(out=out, check=output.check, force=output.force)
+    place = replace(output, out=out)
+    place.require_language(target)
     command = f"{model.text.command} --target {target}" + (f" --form {form}" if form else "")
     if settings is not None:
         command += f" --word {settings.word} --rounding {settings.rounding}"
-    files = {name: text for one in sources for name, text in one.step_files.items()}
-    files |= gain_tables.files(model, sources[1:], target, command)
+    code = {name: text for one in sources for name, text in one.step_files.items()}
+    code |= gain_tables.files(model, sources[1:], target, command)
+    function = replace(sources[0].function, name=model.text.name)
+    whole = replace(sources[0], files=code, function=function, runs=())
+    files = place.files(whole, "kalman.project", whole, model, sources, settings, command)
     if output.check:
         place.show_difference(files, format)
         return
