@@ -194,6 +194,7 @@ def poisoned(state, increments): return state * float("nan")
 def hangs(state, increments):
     while True: time.sleep(1)
 def ends(state, increments): os._exit(3)
+def unpacks(state, increments): (a, b), c = increments
 def few(state): return state
 def other(state, increments, gain): return state
 class Needs:
@@ -224,6 +225,7 @@ FAILS = {
     "wrong:raises": "it raises RuntimeError: no attitude in line 3 of wrong.py",
     "wrong:poisoned": "it leaves no finite numbers in its result, or does not write all of it",
     "wrong:hangs": "calls have not come to an end in 6 s",
+    "wrong:unpacks": "in line 11 of wrong.py; if it takes arrays of other shapes, --arguments says so",
     "wrong:ends": "it ends the program, with exit status 3",
 }
 

@@ -133,7 +133,7 @@ FAULTS = {
     ),
     "other products": (
         {"(a[i] + b[i])": "(0.5 * a[i] + 2 * b[i])"},
-        *(ONE_SIDED, "of no single fault that is known, 1.25 of what sculling needs"),
+        *(ONE_SIDED, "known: their mean is 0.375, that of a sample with itself is right"),
     ),
     "twice": ({"HALF": "1.0"}, "turned push,velocity order,position order", said.TWICE),
     "twice by the middle": (

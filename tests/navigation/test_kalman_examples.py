@@ -256,6 +256,16 @@ def test_numpy_and_c_fly_the_same(name):
     np.testing.assert_allclose(one.errors, other.errors, atol=1e-9)
 
 
+@pytest.mark.long
+def test_in_single_precision_factors_keep_more_digits_than_a_covariance():
+    largest = {}
+    for form in ("ud", "joseph"):
+        one, other = (flights.gnss(model("gnss", form), Case(2, backend)) for backend in ("c", "c-float"))
+        largest[form] = (np.abs(one.errors - other.errors) / one.deviations).max()
+    assert largest["ud"] < 1e-4
+    assert 2 * largest["ud"] < largest["joseph"] < 1e-3
+
+
 @pytest.mark.parametrize("name", ["baro-inertial", pytest.param("fine-alignment", marks=pytest.mark.long)])
 def test_in_words_of_32_bits_it_flies_as_in_double(name):
     one, other = (fly(name, Case(2, backend)) for backend in ("c", "c-fixed32"))

@@ -339,6 +339,16 @@ def suggestions(what: str, value: str, allowed: Iterable[str]) -> list[str]:
     return list(dict.fromkeys([*close, *inside]))[:_MOST_SUGGESTIONS]
 
 
+def did_you_mean(what: str, value: str, allowed: Iterable[str]) -> str:
+    """Return the question for a name that is not known, or nothing.
+
+    >>> did_you_mean("target", "numpi", ["numpy", "c"])
+    ' (did you mean numpy?)'
+    """
+    names = suggestions(what, value, allowed)
+    return f" (did you mean {alternatives(names)}?)" if names else ""
+
+
 def unknown(what: str, value: object, allowed: Iterable[str], also: str = "", section: str = "") -> str:
     """Return the message for an unknown name; `also` and `section` refer to further names.
 
@@ -347,8 +357,7 @@ def unknown(what: str, value: object, allowed: Iterable[str], also: str = "", se
     """
     names = list(allowed)
     section = section or SECTIONS.get(what, "")
-    meant = suggestions(what, value, names) if isinstance(value, str) else []
-    question = f" (did you mean {alternatives(meant)}?)" if meant else ""
+    question = did_you_mean(what, value, names) if isinstance(value, str) else ""
     cut = bool(section) and len(names) > MOST_NAMES + 1
     listed = some(names) if cut else ", ".join(names)
     listed += f", or {also}" if also else ""

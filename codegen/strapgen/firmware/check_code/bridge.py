@@ -24,6 +24,7 @@ from strapgen.firmware.check_code.foreign_arguments import (
     ForeignArgument,
     ForeignArguments,
     is_foreign,
+    is_whole,
 )
 from strapgen.firmware.check_code.signature import (
     Signature,
@@ -276,9 +277,6 @@ def _with_init(source: ForeignSource, init: str, reader: SourceReader) -> Foreig
     if made and source.read.is_cpp:
         return replace(source, constructor=(made.name, said), init=init)
     signature = reader.signature("--init", name)
-    called = signature.name
-    if signature.owner:
-        called = f"{reading.variable(memories[0])}.{called.rpartition('::')[2]}"
     if not bracket:
         state = source.arguments.named(STATE)
         passed = []
@@ -294,7 +292,14 @@ def _with_init(source: ForeignSource, init: str, reader: SourceReader) -> Foreig
                     f'--init "{init}(...)" states its arguments'
                 )
         said = ", ".join(passed)
-    return replace(source, begins=f"{called}({said});", init=init)
+    return replace(source, begins=f"{_called(signature, source.arguments)}({said});", init=init)
+
+
+def _called(signature: Signature, arguments: ForeignArguments) -> str:
+    """Return what is called: a function, or a method of the first object in memory."""
+    if not signature.owner:
+        return signature.name
+    return f"{reading.variable(arguments.memories[0])}.{_last(signature.name)}"
 
 
 def _with_publications(source: ForeignSource, publishes: str, reader: SourceReader) -> ForeignSource:
@@ -397,10 +402,7 @@ def _call(source: ForeignSource, keeps: bool) -> str:
                 passed.append(argument.text)
             elif value.passed != "return":
                 passed.append(_passed(value))
-    name = signature.name
-    if signature.owner:
-        name = f"{reading.variable(source.arguments.memories[0])}.{name.rpartition('::')[2]}"
-    call = f"{name}({', '.join(passed)});"
+    call = f"{_called(signature, source.arguments)}({', '.join(passed)});"
     if keeps:
         return f"auto &&strapgen_returned = {call}" if source.read.is_cpp else f"strapgen_returned = {call}"
     if source.publishes != 1 and not source.counter and source.signature.returns is not None:
@@ -439,11 +441,14 @@ def _before(source: ForeignSource, values: Sequence[Value]) -> list[str]:
     arguments, lines = source.arguments, []
     for argument in arguments.fed:
         lines += [f"{place} = *input++;" for place in numbers_of(argument)]
+    times = {name: f"strapgen_dt / {unit!r}" for name, unit in INTERVALS.items()} | {
+        STEP: "strapgen_step",
+        ZEROS: "0",
+    }
     for argument in arguments.parameters:
-        for place in numbers_of(argument) if argument.name in (*INTERVALS, STEP, ZEROS) else ():
-            unit, whole = INTERVALS.get(argument.name, 1.0), argument.carriers[0].number not in PRECISIONS
-            time = "strapgen_step" if argument.name == STEP else f"strapgen_dt / {unit!r}{' + 0.5' * whole}"
-            lines.append(f"{place} = {'0' if argument.name == ZEROS else time};")
+        for place in numbers_of(argument) if argument.name in times else ():
+            nearest = " + 0.5" if is_whole(argument) and argument.name != ZEROS else ""
+            lines.append(f"{place} = {times[argument.name]}{nearest};")
     for result in arguments.results:
         held = arguments.before(result)
         is_new = result.name in ARGUMENTS_OF_RESULTS and (held is None or held.name != result.name)
@@ -455,23 +460,21 @@ def _before(source: ForeignSource, values: Sequence[Value]) -> list[str]:
             f"memset({_variable(value)}.before, 0x5a, 64); memset({_variable(value)}.after, 0x5a, 64);"
         )
     if watched := _watched(arguments):
-        lines.append(
-            f"const double strapgen_kept[] = {{{', '.join(f'(double)({place})' for place in watched)}}};"
-        )
+        lines.append(f"const double strapgen_kept[] = {watched};")
     if source.counter:
         lines.append(f"const double strapgen_counted = (double)({source.counter});")
     return lines
 
 
-def _watched(arguments: ForeignArguments) -> list[str]:
-    """Return the numbers that a call must not change."""
-    unwatched = [*arguments.results, *(argument for argument in arguments.parameters if argument.type)]
-    return [
-        place
+def _watched(arguments: ForeignArguments) -> str:
+    """Return the list in C of the numbers that a call must not change; "" if there are none."""
+    places = [
+        f"(double)({place})"
         for argument in arguments.parameters
-        if argument not in unwatched and argument.name != CONSTANT
+        if not (argument in arguments.results or argument.type or argument.name == CONSTANT)
         for place in numbers_of(argument)
     ]
+    return f"{{{', '.join(places)}}}" if places else ""
 
 
 def _after(source: ForeignSource, values: Sequence[Value]) -> list[str]:
@@ -481,9 +484,7 @@ def _after(source: ForeignSource, values: Sequence[Value]) -> list[str]:
         name = _variable(value)
         lines.append(f"flags |= strapgen_touched({name}.before) | strapgen_touched({name}.after);")
     if watched := _watched(arguments):
-        lines.append(
-            f"const double strapgen_seen[] = {{{', '.join(f'(double)({place})' for place in watched)}}};"
-        )
+        lines.append(f"const double strapgen_seen[] = {watched};")
         lines.append("flags |= memcmp(strapgen_seen, strapgen_kept, sizeof strapgen_kept) != 0 ? 2 : 0;")
     if source.counter:
         lines.append(f"published = (double)({source.counter}) != strapgen_counted;")

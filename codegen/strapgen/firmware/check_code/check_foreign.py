@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Generator, Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from typing import ClassVar
+from itertools import islice
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from strapgen.firmware.check_code import coning_causes, ladder
+from strapgen.firmware.check_code import coning_causes, ladder, probes
 from strapgen.firmware.check_code.bridge import ForeignSource
 from strapgen.firmware.check_code.conformance import Finding, finding_text
 from strapgen.firmware.check_code.coning_causes import MeasuredCoefficient
@@ -25,25 +26,8 @@ from strapgen.firmware.check_code.foreign import (
     lengths,
 )
 from strapgen.firmware.check_code.foreign_arguments import RATES
-from strapgen.firmware.check_code.probes import (
-    DIRECTION_WITHIN,
-    SIZE_WITHIN,
-    Directions,
-    Products,
-    Rest,
-    convention_of,
-    direction_segments,
-    directions,
-    fits,
-    in_words,
-    off,
-    product_segments,
-    products,
-    rest,
-    rest_segments,
-    sizes_in_words,
-)
-from strapgen.firmware.check_code.remedy import Remedy, remedy
+from strapgen.firmware.check_code.probes import DIRECTION_WITHIN, SIZE_WITHIN, Directions, Products, Rest, off
+from strapgen.firmware.check_code.remedy import remedy
 from strapgen.firmware.check_code.rotation import placement, rotation, rotation_segments
 from strapgen.firmware.check_code.upsets import upsets
 from strapgen.firmware.check_code.velocity import Velocity
@@ -61,16 +45,13 @@ _NORM_WITHIN = 1e-4
 _FRAME_WITHIN = 0.005
 #: Units in the last place that rounding adds in a call.
 _UNITS_A_CALL = 64
+#: Exceptions of Python at arrays of another shape than a function takes.
+_OF_SHAPES = ("it raises ValueError", "it raises IndexError", "it raises TypeError")
 #: Largest component in rad of random increments.
 _RANDOM = 0.02
 
 
-FRAME_AT_START = (
-    "the rotation of the frame is turned to the body axes of the start of the call, not of its middle"
-)
-FRAME_AT_END = (
-    "the rotation of the frame is turned to the body axes of the end of the call, not of its middle"
-)
+_FRAME_AT = "the rotation of the frame is turned to the body axes of the {} of the call, not of its middle"
 
 
 @dataclass(frozen=True)
@@ -170,13 +151,8 @@ class _Check:
         self.step = step
         self.count = step.samples
         self.causes: list[str] = []
-        self.order: float | None = None
-        self.drift: Array | None = None
-        self.closed: float | None = None
-        self.coefficients: tuple[MeasuredCoefficient, ...] = ()
-        self.ratio: float | None = None
-        self.sure: tuple[float, str] | None = None
-        self.remedy: Remedy | None = None
+        #: What is measured by now, as the result has it
+        self.known: dict[str, Any] = dict.fromkeys(("order", "drift_deg_h", "closed_form_deg_h"))
         #: That of the function, once it is known
         self.convention: Convention | None = None
         size = min(_RANDOM, step.most / 2)  # of a component, half as large as a vector may be
@@ -188,31 +164,21 @@ class _Check:
         findings = tuple(self.findings())
         findings += tuple(self.upsets(findings))
         failed = any(finding.holds is False for finding in findings)
-        cause = "; ".join(dict.fromkeys(self.causes)) if failed and self.causes else None
         return ForeignResult(
             str(self.step.source.file),
             self.step.source.function,
             findings,
-            self.order,
-            None if self.drift is None else float(np.linalg.norm(self.drift)),
-            self.closed,
-            cause,
-            None if self.drift is None else tuple(map(float, self.drift)),
-            self.coefficients,
-            self.ratio,
-            self.sure[0] if self.sure else None,
-            self.sure[1] if self.sure else None,
-            self.remedy.code if self.remedy else None,
-            self.remedy.command if self.remedy else None,
-            self.step.reading,
-            None if self.velocity is None else self.velocity.measured,
+            cause="; ".join(dict.fromkeys(self.causes)) or None if failed else None,
+            reading=self.step.reading,
+            translation=None if self.velocity is None else self.velocity.measured,
+            **self.known,
         )
 
     def findings(self) -> Iterator[Finding]:
         """Yield the findings, up to a fault that hides all others."""
         convention, response = self.step.convention, None
         if self.step.source.arguments.elements:
-            first = self.step.run(direction_segments(self.step))
+            first = self.step.run(probes.direction_segments(self.step))
             calls = self.calls(first)
             if calls.holds is False:
                 yield calls
@@ -222,10 +188,10 @@ class _Check:
                 text = "the attitude stays zero: --init names what makes it no rotation before the first call"
                 yield self.failed("axes", text)
                 return
-            known, response = convention_of(self.step, directions(self.step, first.segments))
+            known, response = probes.convention_of(self.step, probes.directions(self.step, first.segments))
             if known is None:
                 yield calls
-                yield self.failed("axes", in_words(self.step, response.steady), off(response))
+                yield self.failed("axes", probes.in_words(self.step, response.steady), off(response))
                 return
             convention = known
         everything = self.segments()
@@ -239,16 +205,14 @@ class _Check:
             yield from axes
             if axes[-1].holds is False and off(response) <= SIZE_WITHIN:  # about reference axes
                 return
-        runs, place = {}, 0
-        for name, part in everything:
-            runs[name] = done.segments[place : place + len(part)]
-            place += len(part)
+        segments = iter(done.segments)
+        runs = {name: tuple(islice(segments, len(part))) for name, part in everything}
         if response is not None:
             runs = yield from self.measured(convention, runs)
         if self.velocity is not None:
             yield from self.velocity.findings(runs)
             self.causes.extend(self.velocity.causes)
-            self.sure = self.sure or self.velocity.sure
+            self.known |= {} if "replacement" in self.known else self.velocity.sure
         yield self.repeated(*runs["runs"])
         yield from self.used(convention)
 
@@ -260,7 +224,7 @@ class _Check:
                 for name in ("norm", "rotation")
             )
             for finding, cause in upsets(self.step, self.convention, long=lasts, rotates=rotates):
-                self.causes.extend([cause] if cause else [])
+                self.causes += filter(None, [cause])
                 yield finding
 
     def failed(self, name: str, text: str, measured: float | None = None) -> Finding:
@@ -271,13 +235,9 @@ class _Check:
     def calls(self, done: ForeignRun) -> Finding:
         """Return the finding on crashes of calls, and on writes outside of their memory."""
         if done.stopped:
-            raises = done.stopped.startswith("it raises") and not isinstance(self.step.source, ForeignSource)
-            also = (
-                "; if it takes arrays of other shapes, --arguments says so, as increments[2][3]"
-                if raises
-                else ""
-            )
-            return self.failed("calls", f"{done.stopped}{also}")
+            also = "; if it takes arrays of other shapes, --arguments says so, as increments[2][3]"
+            of_shapes = done.stopped.startswith(_OF_SHAPES)
+            return self.failed("calls", f"{done.stopped}{also * of_shapes}")
         if done.writes_beyond:
             return self.failed("calls", "it writes beyond the ends of its arrays")
         if done.changes_inputs:
@@ -301,14 +261,14 @@ class _Check:
             )
             return
         yield self.fits("sense", declared.sense, known.sense, "the attitude is")
+        text = "a rotation turns about reference axes, not about body axes: a product in the wrong order"
         if off(response) > SIZE_WITHIN:
-            yield self.failed("axes", sizes_in_words(response.steady), off(response))
-        elif not about_reference:
+            yield self.failed("axes", probes.sizes_in_words(response.steady), off(response))
+        elif about_reference:
+            yield self.failed("axes", text, response.order_of_turns)
+        else:
             text = "rotations about x, y and z are those of the body"
             yield Finding("axes", True, text, off(response), SIZE_WITHIN)
-        else:
-            text = "a rotation turns about reference axes, not about body axes: a product in the wrong order"
-            yield self.failed("axes", text, response.order_of_turns)
 
     def fits(self, name: str, ours: str, known: str, what: str) -> Finding:
         """Return the finding on a declared part of the convention."""
@@ -330,10 +290,10 @@ class _Check:
     def of_attitude(self, increments: Array) -> list[tuple[str, list[Segment]]]:
         """Return the segments of the measurements of the attitude."""
         return [
-            ("at rest", rest_segments(self.step)),
-            ("directions", direction_segments(self.step)),
+            ("at rest", probes.rest_segments(self.step)),
+            ("directions", probes.direction_segments(self.step)),
             ("rotation", rotation_segments(self.step)),
-            ("products", [] if self.step.takes == ENDS else product_segments(self.step)),
+            ("products", [] if self.step.takes == ENDS else probes.product_segments(self.step)),
             ("symmetry", [Segment(increments), Segment(increments @ _frame().T)]),
             ("order", ladder.ladder_segments(self.step)),
             ("drift", ladder.drift_segments(self.step)),
@@ -344,18 +304,18 @@ class _Check:
     ) -> Generator[Finding, None, dict[str, tuple[SegmentRun, ...]]]:
         """Yield the findings on the attitude; return all runs as they would be in a resting frame."""
         self.convention = convention
-        still = rest(self.step, runs["at rest"])
+        still = probes.rest(self.step, runs["at rest"])
         resting = self.at_rest(still)
         yield resting
         runs = {name: tuple(run.in_resting_frame(still.frame) for run in part) for name, part in runs.items()}
-        response = directions(self.step, runs["directions"])
+        response = probes.directions(self.step, runs["directions"])
         delay = self.delay(response)
         coefficients = None
         turned = rotation(self.step, convention, runs["rotation"])
         if still.frame.any() and self.step.source.precision == "double":
             yield self.frame_placement(still.frame, runs["rotation"])
         if self.step.takes != ENDS and delay.holds and off(response) <= SIZE_WITHIN:
-            coefficients = products(self.step, runs["products"], exact=turned.order >= 3)
+            coefficients = probes.products(self.step, runs["products"], exact=turned.order >= 3)
             if coning_causes.comes_late(coefficients):
                 delay = Finding("delay", False, "a later call corrects the samples of a call", delay.measured)
         yield delay
@@ -379,7 +339,7 @@ class _Check:
             return self.in_frame(still, -self.step.frame * seconds, causes)
         self.causes.extend(causes)
         text = f"without rotation the state {'stays as it is' if still.moved <= allowed else 'moves'}"
-        return Finding("at rest", still.moved <= allowed, text, still.moved, allowed)
+        return Finding.within("at rest", text, still.moved, allowed)
 
     def in_frame(self, still: Rest, wanted: Array, causes: list[str]) -> Finding:
         """Return the finding on a run without rotation in a frame that moves, by a rotation vector in a call."""
@@ -389,12 +349,9 @@ class _Check:
         if off <= allowed:
             text = "without rotation the state turns as its frame does"
             return Finding("at rest", True, text, off / size, allowed / size)
-        if np.linalg.norm(still.frame + wanted) <= allowed:
-            text = "the rate of the frame has the wrong sign"
-        elif np.linalg.norm(still.frame) <= allowed:
-            text = "the rate of the frame is absent"
-        else:
-            text = "the rate of the frame is another"
+        known = {"has the wrong sign": still.frame + wanted, "is absent": still.frame}
+        said = [words for words, left in known.items() if np.linalg.norm(left) <= allowed]
+        text = f"the rate of the frame {[*said, 'is another'][0]}"
         return self.failed("at rest", ": ".join([text, *causes[:1]]), off / size)
 
     def frame_placement(self, frame: Array, runs: Sequence[SegmentRun]) -> Finding:
@@ -403,21 +360,18 @@ class _Check:
         text = f"of the rotation of the frame {0.5 + place:.3g} is in the body axes of the end of the call; wanted 0.5"
         holds = abs(place) <= DIRECTION_WITHIN
         if not holds:
-            known = {-0.5: FRAME_AT_START, 0.5: FRAME_AT_END}
-            self.causes.append(known.get(round(2 * place, 1) / 2, text))
+            where = {-0.5: "start", 0.5: "end"}.get(round(2 * place, 1) / 2)
+            self.causes.append(_FRAME_AT.format(where) if where else text)
         return Finding("frame placement", holds, text, place, DIRECTION_WITHIN)
 
     def delay(self, response: Directions) -> Finding:
         """Return the finding on the delay between samples and rotation."""
-        lag, ends = response.lag, self.step.takes == ENDS
-        if abs(lag) <= DIRECTION_WITHIN if ends else fits(response.at_once):
+        lag, takes = response.lag, self.step.takes
+        if abs(lag) <= DIRECTION_WITHIN if takes == ENDS else probes.fits(response.at_once):
             return Finding("delay", True, "a call turns by its own samples", lag)
         half = 0.5 if self.step.takes == RATES else -0.5
-        if (
-            self.step.takes in RATE_INPUTS
-            and abs(lag - half) < DIRECTION_WITHIN
-            and (said := self.other_rates())
-        ):
+        is_half = takes in RATE_INPUTS and abs(lag - half) < DIRECTION_WITHIN
+        if is_half and (said := self.other_rates()):
             return self.failed("delay", said, lag)
         size = "one sample" if abs(abs(lag) - 1) < DIRECTION_WITHIN else f"{abs(lag):.2g} samples"
         return self.failed("delay", f"rotation {size} {'late' if lag > 0 else 'early'}", lag)
@@ -429,7 +383,8 @@ class _Check:
         holds = {finding.name: finding.holds for finding in checked.findings()}
         if not holds.get("delay") or holds.get("order") is False:
             return None
-        order = "" if checked.order is None else f", order {checked.order:.2f}"
+        seen = checked.known["order"]
+        order = "" if seen is None else f", order {seen:.2f}"
         said = (
             "rates at instants are taken for means: its rates are those at the ends of the intervals"
             if other == ENDS
@@ -456,35 +411,28 @@ class _Check:
             proved = proved if shown.holds else min(proved, 2)
         seen = ladder.ladder(self.step, runs["order"], standard)
         if self.step.source.precision != "double":
-            order, self.order = ladder.order_in_float(self.step, seen, standard, proved)
+            order, self.known["order"] = ladder.order_in_float(self.step, seen, standard, proved)
         else:
-            order, self.order = ladder.order_on_ladder(self.step, seen)
+            order, self.known["order"] = ladder.order_on_ladder(self.step, seen)
         yield order
         measured_design = None if coefficients is None else coning_causes.measured_design(coefficients)
-        drift, self.drift, self.closed = ladder.drift_on_cones(
-            self.step, runs["drift"], standard, measured_design
-        )
-        yield drift
+        finding, drift, closed = ladder.drift_on_cones(self.step, runs["drift"], standard, measured_design)
+        self.known |= {"drift_axes_deg_h": tuple(map(float, drift)), "closed_form_deg_h": closed}
+        self.known["drift_deg_h"] = float(np.linalg.norm(drift))
+        yield finding
 
     def shown(self, known: Products) -> Finding:
         """Return the finding on the coefficients, and keep them beside those that are wanted."""
-        self.coefficients = coning_causes.measured(known)
-        self.ratio = coning_causes.ratio(known)
+        ratio = coning_causes.ratio(known)
+        self.known |= {"coefficients": coning_causes.measured(known), "coefficient_ratio": ratio}
         holds = coning_causes.corrects_coning(known) and not coning_causes.weights_off(known)
         if (said := coning_causes.cause(known)) is not None:
             self.causes.append(said)
-            self.sure = coning_causes.confidence(known, said)
+            self.known |= coning_causes.sureness(known, said)
         if not holds:
-            self.remedy = remedy(coning_causes.nearest(known)[1])
-        return Finding(
-            *(
-                "coefficients",
-                holds,
-                coning_causes.in_words(known),
-                self.ratio,
-                coning_causes.tolerance(known),
-            )
-        )
+            self.known |= remedy(coning_causes.nearest(known)[1])
+        text, allowed = coning_causes.in_words(known), coning_causes.tolerance(known)
+        return Finding("coefficients", holds, text, ratio, allowed)
 
     def symmetry(self, plain: SegmentRun, turned: SegmentRun) -> Finding:
         """Rotate all increments: the attitude must rotate with them."""
@@ -493,7 +441,7 @@ class _Check:
         allowed = _UNITS_A_CALL * self.step.unit * len(plain.relative)
         says = "turns" if off <= allowed else "does not turn"
         text = f"with all increments turned the attitude {says} with them"
-        return Finding("symmetry", off <= allowed, text, off, allowed)
+        return Finding.within("symmetry", text, off, allowed)
 
     def norm(self, convention: Convention, run: SegmentRun) -> Finding:
         """Check the length of the state along the cone."""
@@ -505,7 +453,7 @@ class _Check:
             self.causes.append(
                 f"the state's length is off: {size[0]:.6g} at first, {size[-1]:.6g} in the end"
             )
-        return Finding("norm", off <= allowed, text, off, allowed)
+        return Finding.within("norm", text, off, allowed)
 
     def repeated(self, first: SegmentRun, second: SegmentRun) -> Finding:
         """Compare a run with the same run again, after a reset."""

@@ -193,16 +193,14 @@ def cause(products: Products) -> str | None:
 def one_sided(sides: tuple[Table, Table], noise: float, samples: int) -> str | None:
     """Return the cause where the products of one side alone are wrong: d_i x v_j, or v_i x d_j, i the older sample."""
     for ideal, base in _ideals(samples):
-        corrections = [_less(side, base) for side in sides]
-        right = [_alike(each, ideal, noise) for each in corrections]
+        right = [_alike(_less(side, base), ideal, noise) for side in sides]
         if right.count(True) == 1:
-            wrong, names = corrections[right.index(False)], ["d_i x v_j", "v_i x d_j"]
-            visible = {pair: ideal.get(pair, 0.0) for pair in wrong}
+            wrong, visible = _beside(ideal, sides[right.index(False)], base)
+            names = ("d_i x v_j", "v_i x d_j") if right[1] else ("v_i x d_j", "d_i x v_j")
             size = f"{_moment(wrong) / _moment(visible):.3g} times as large as needed"
             said = (
                 "absent" if not _any(wrong) else size if _alignment(wrong, visible) > _MULTIPLE else "wrong"
             )
-            names = names if right[1] else names[::-1]
             return f"of an older sample i and a newer j {names[0]} is {said}, {names[1]} right"
     return None
 
@@ -267,10 +265,21 @@ def confidence(products: Products, said: str) -> tuple[float, str] | None:
     return max(0.0, 1.0 - best / left[other]) if left[other] else 0.0, other
 
 
+def sureness(products: Products, said: str) -> dict[str, float | str]:
+    """Return the confidence as a result has it; nothing where there is none."""
+    known = confidence(products, said)
+    return {"cause_confidence": known[0], "next_cause": known[1]} if known else {}
+
+
+def _beside(ideal: Table, table: Table, base: Table) -> tuple[Table, Table]:
+    """Return the correction that a table is beside a base, and what can be seen there of an ideal one."""
+    correction = _less(table, base)
+    return correction, {pair: ideal.get(pair, 0.0) for pair in correction}
+
+
 def _scaled_rest(products: Products, base: Table, ideal: Table) -> float:
     """Return what the multiple of a correction leaves that fits best."""
-    correction = _less(products.at_once, base)
-    visible = {pair: ideal.get(pair, 0.0) for pair in correction}
+    correction, visible = _beside(ideal, products.at_once, base)
     size = _size(visible) ** 2
     factor = sum(c * visible[pair] for pair, c in correction.items()) / size if size else 0.0
     return _size({pair: c - factor * visible[pair] for pair, c in correction.items()})
@@ -279,8 +288,7 @@ def _scaled_rest(products: Products, base: Table, ideal: Table) -> float:
 def _by_size(products: Products) -> str:
     """Return the cause in words for a multiple of a known correction, or for no correction."""
     for ideal, base in _ideals(products.samples):
-        correction = _less(products.finally_, base)
-        visible = {pair: ideal.get(pair, 0.0) for pair in correction}
+        correction, visible = _beside(ideal, products.finally_, base)
         if _alignment(correction, visible) > _MULTIPLE:
             size = _moment(correction) / _moment(visible)
             return f"correction {size:.3g} times as large as needed"

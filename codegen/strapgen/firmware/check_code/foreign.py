@@ -85,6 +85,7 @@ _FLAGS = ("-O1", "-ffp-contract=off", "-g0", "-fPIC", "-fvisibility=hidden")
 _WHOLE_WITHIN = 1e-3
 #: Calls in which a function that has a result after several calls has two at least.
 _MOST_CALLS = 130
+_NOT_FINITE = "it leaves no finite numbers in its result, or does not write all of it"
 _MODULE = "strapgen_foreign"
 _DECLARATION = (
     "int strapgen_foreign_run(long calls, const double *identity, const double *input, double *output);"
@@ -122,8 +123,7 @@ class Convention:
         if states.shape[-1] == 9:
             matrices = _nearest(states.reshape(-1, 3, 3))
         elif states.shape[-1] == 3:
-            turns = evaluator("dcm-update")(np.broadcast_to(np.eye(3), (len(states), 3, 3)), states)
-            matrices = np.array(list(accumulate(turns, np.matmul)))
+            matrices = np.array(list(accumulate(rotations(states), np.matmul)))
         else:
             matrices = evaluator("dcm-from-euler")(self.ours(states / _or_one(lengths(states))[:, None]))
         return matrices if self.sense == SENSES[0] else np.swapaxes(matrices, -1, -2)
@@ -175,8 +175,7 @@ class SegmentRun:
         reference axes.
         """
         counts = np.arange(len(self.relative))[:, None]
-        back = evaluator("dcm-update")(np.broadcast_to(np.eye(3), (len(counts), 3, 3)), -counts * frame)
-        return replace(self, relative=self.start.T @ back @ self.start @ self.relative)
+        return replace(self, relative=self.start.T @ rotations(-counts * frame) @ self.start @ self.relative)
 
 
 @dataclass(frozen=True)
@@ -352,10 +351,9 @@ class ForeignStep:
 
     def _identity(self, convention: Convention) -> Array:
         """Return the results before any call: no rotation, and no velocity."""
-        elements = self.source.arguments.elements
-        return np.concatenate(
-            [convention.identity(elements), np.zeros(self.source.arguments.numbers - elements)]
-        )
+        arguments = self.source.arguments
+        identity = convention.identity(arguments.elements)
+        return np.concatenate([identity, np.zeros(arguments.numbers - len(identity))])
 
     def run(self, segments: Sequence[Segment], convention: Convention | None = None) -> ForeignRun:
         """Run segments one after the other in one process."""
@@ -365,9 +363,7 @@ class ForeignStep:
         identity = self._identity(read)
         done, parts = self.outputs(segments, read)
         if not done.stopped and not np.abs(done.outputs).max() < _LARGEST:  # not finite: no number compares
-            done = replace(
-                done, stopped="it leaves no finite numbers in its result, or does not write all of it"
-            )
+            done = replace(done, stopped=_NOT_FINITE)
         if done.stopped:
             return done
         runs = []
@@ -377,13 +373,10 @@ class ForeignStep:
             whole = np.vstack([before, outputs[first:]])
             states = whole[:, :elements]
             matrices = read.matrices(states)
-            translations = dict(
-                zip(
-                    arguments.meanings, np.split(whole[:, elements:], len(arguments.meanings), 1), strict=True
-                )
-                if arguments.meanings
-                else ()
-            )
+            ends = range(elements + 3, arguments.numbers + 1, 3)
+            translations = {
+                name: whole[:, end - 3 : end] for name, end in zip(arguments.meanings, ends, strict=True)
+            }
             runs.append(SegmentRun(states[1:], matrices[1:], matrices[0].T @ matrices, translations))
         return replace(done, segments=tuple(runs))
 
@@ -399,19 +392,15 @@ class ForeignStep:
         if is_whole(self.source.arguments.samples):
             numbers = np.diff(np.round(np.cumsum(numbers.reshape(-1, 3), axis=0)), axis=0, prepend=0.0)
         numbers = numbers.reshape(len(segment.increments) + len(quiet), -1)
-        beside = self._beside(segment, len(quiet))
-        numbers = np.hstack(
-            [numbers, *(np.broadcast_to(each, (len(numbers), each.shape[-1])) for each in beside)]
-        )
-        rows = np.empty((len(numbers), 3 + numbers[0].size))
-        rows[0, 0], rows[1:, 0] = 2 if segment.used else 1, 0
-        rows[:, 1] = float(self.interval)
-        rows[:, 2] = float(self.interval * self.source.arguments.count)
-        rows[:, 3:] = numbers
+        calls = len(numbers)
+        beside = [
+            np.broadcast_to(each, (calls, each.shape[-1])) for each in self._beside(segment, len(quiet))
+        ]
+        begins, intervals = np.zeros(calls), np.full(calls, float(self.interval))
+        begins[0] = 2 if segment.used else 1
         if segment.intervals is not None:
-            rows[len(quiet) :, 1] = segment.intervals
-            rows[len(quiet) :, 2] = segment.intervals * self.source.arguments.count
-        return rows
+            intervals[len(quiet) :] = segment.intervals
+        return np.column_stack([begins, intervals, intervals * self.source.arguments.count, numbers, *beside])
 
     def _beside(self, segment: Segment, quiet: int) -> Iterator[Array]:
         """Yield what calls get beside the samples of the gyro, a row for each of them or one for all."""
@@ -436,15 +425,8 @@ def compile_foreign(source: ForeignSource) -> Path:
         preprocessed = [
             _preprocess(source, each).replace(str(text), "bridge") for each in (text, *source.sources)
         ]
-    key = cache.digest(
-        [
-            *preprocessed,
-            bridge,
-            repr((source.read.options, source.libraries)),
-            compiler.C.identity(_FLAGS),
-            of.identity(),
-        ]
-    )
+    identities = compiler.C.identity(_FLAGS), of.identity()
+    key = cache.digest([*preprocessed, bridge, repr((source.read.options, source.libraries)), *identities])
 
     def fill(draft: Path) -> None:
         with timed("compile", source.function):
@@ -454,9 +436,8 @@ def compile_foreign(source: ForeignSource) -> Path:
             if source.read.is_cpp:
                 flags.append("-fno-access-control")
             flags += source.libraries
-            if reasons := compiler.compile_module(
-                draft, _MODULE, files, _DECLARATION, _DECLARATION, flags, of
-            ):
+            declared = (_DECLARATION, _DECLARATION)
+            if reasons := compiler.compile_module(draft, _MODULE, files, *declared, flags, of):
                 raise CompilerError(_diagnostics(source, reasons))
 
     folder_of_build = cache.entry("builds", key, fill, f"compiled {source.function}")
@@ -564,12 +545,18 @@ def _diagnostics(source: ForeignSource, lines: list[str]) -> str:
     return f"{source.file} does not compile: {error}"
 
 
+def rotations(vectors: Array) -> Array:
+    """Return the rotations (..., 3, 3) by rotation vectors (..., 3) in rad."""
+    turned: Array = evaluator("dcm-update")(np.broadcast_to(np.eye(3), (*vectors.shape[:-1], 3, 3)), vectors)
+    return turned
+
+
 def rotation_vectors(matrices: Array) -> Array:
     """Return the rotation vectors of rotations.
 
     `matrices` has shape (..., 3, 3). Returns (..., 3): in rad.
 
-    >>> rotation_vectors(evaluator("dcm-update")(np.eye(3), np.array([0.0, 0.0, 2.0]))).round(12) + 0.0
+    >>> rotation_vectors(rotations(np.array([0.0, 0.0, 2.0]))).round(12) + 0.0
     array([0., 0., 2.])
     """
     sines = drift_between(np.broadcast_to(np.eye(3), matrices.shape), matrices)

@@ -11,7 +11,7 @@ are needed only where the source leaves open how many there are::
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 from math import prod
 from pathlib import Path
@@ -35,8 +35,6 @@ INTERVALS = {INTERVAL: 1.0, "dt_ms": 1e-3, "dt_us": 1e-6}
 #: Numbers that are not looked at, fed as zeros; a constant of C, as =0; the object of a method.
 ZEROS, CONSTANT, MEMORY = "zeros", "=", "self"
 SAMPLES = (INCREMENTS, RATES)
-#: Numbers of the shapes of an attitude.
-ATTITUDES = ((4,), (9,), (3, 3))
 #: Result of a function that computes the rotation vector of its call and leaves the attitude to others.
 ROTATION = "rotation"
 #: The specific force: velocity increments in m/s, or the force in m/s^2, samples of the same intervals.
@@ -53,8 +51,14 @@ _NEXT = "next_"
 ARGUMENTS_OF_RESULTS = (STATE, NEXT, ROTATION, *TRANSLATIONS, _NEXT + VELOCITY, _NEXT + POSITION)
 #: Arguments that are filled before a call beside the samples of the gyro.
 _FED = (PUSHES, (GRAVITY,), (FRAME_RATE,))
-#: Most samples in a call, and most from before it.
-_MOST_SAMPLES, _MOST_PREVIOUS = 8, 3
+#: Most vectors of what is a row of samples, and the shapes of all else; a time is one number.
+_MOST = {**dict.fromkeys((*SAMPLES, *PUSHES), 8), PREVIOUS: 3}
+_ATTITUDES = ((4,), (9,), (3, 3))
+_SHAPES = {
+    **dict.fromkeys((STATE, NEXT), _ATTITUDES),
+    **dict.fromkeys((*ARGUMENTS_OF_RESULTS[2:], GRAVITY, FRAME_RATE, ZEROS), ((3,),)),
+    **dict.fromkeys((*INTERVALS, STEP), ()),
+}
 _ARRAY = re.compile(r"(?:(global)\s+)?([A-Za-z_](?:[\w.:]|\(\))*(?: +\w+)*)\s*((?:\[\s*\d+\s*\]\s*)*)")
 _MEMORY_PATTERN = re.compile(r"((?:[A-Za-z_][\w:]*\s+)*[A-Za-z_][\w:]*)\s*([*&])\s*([A-Za-z_]\w*)")
 _ALLOWED = (
@@ -216,8 +220,8 @@ def require_consistent(
     parameters: Sequence[ForeignArgument], result: ForeignArgument, translations: Sequence[ForeignArgument]
 ) -> None:
     """Refuse arguments and results that say nothing without each other, or whose numbers differ."""
-    _refuse_what_does_not_fit(parameters, result)
-    _refuse_other_results(parameters, [result] if result.name else [], translations)
+    for reason in _contradictions(parameters, result, translations):
+        raise InputError(f"--arguments: {reason}")
 
 
 def _argument(text: str, memories: Collection[str]) -> ForeignArgument:
@@ -227,19 +231,19 @@ def _argument(text: str, memories: Collection[str]) -> ForeignArgument:
     if memory := _MEMORY_PATTERN.fullmatch(text):
         return ForeignArgument(memory[3], (), memory[1], memory[2])
     argument = _array(text)
-    vectors = dict.fromkeys(
-        (ROTATION, *TRANSLATIONS, _NEXT + VELOCITY, _NEXT + POSITION, GRAVITY, FRAME_RATE, ZEROS), ((3,),)
-    )
-    times = dict.fromkeys((*INTERVALS, STEP), ())
-    shapes = {STATE: ATTITUDES, NEXT: ATTITUDES, **times, **vectors}
-    if argument.name in (*SAMPLES, PREVIOUS, *PUSHES):
-        most = _MOST_PREVIOUS if argument.name == PREVIOUS else _MOST_SAMPLES
-        _require_vectors(argument, most)
-    elif argument.name not in shapes and text in memories:
-        return ForeignArgument(text, (), text)
-    elif argument.name not in shapes:
+    name, shape, most = argument.name, argument.shape, _MOST.get(argument.name, 0)
+    if most and shape:
+        is_row = shape[1:] == (3,) or (len(shape) == 1 and shape[0] % 3 == 0)
+        if not (is_row and 1 <= argument.size // 3 <= most):
+            raise InputError(
+                f"--arguments: {name} has the shape {list(shape)}; [3], [K][3] or [3 K] is needed, "
+                f"with K from 1 to {most}"
+            )
+    elif not most and name not in _SHAPES:
+        if text in memories:
+            return ForeignArgument(text, (), text)
         raise InputError(f"--arguments: {shown(text)} is not known; allowed: {_ALLOWED}")
-    elif argument.shape and argument.shape not in shapes[argument.name]:
+    elif shape and shape not in _SHAPES[name]:
         raise InputError(f"--arguments: {shown(text)} has another shape; allowed: {_ALLOWED}")
     return argument
 
@@ -252,19 +256,6 @@ def _array(text: str) -> ForeignArgument:
     return ForeignArgument(name, tuple(map(int, re.findall(r"\d+", array[3]))))
 
 
-def _require_vectors(argument: ForeignArgument, most: int) -> None:
-    """Refuse samples that are not one vector or several, one after the other."""
-    if not (shape := argument.shape):
-        return
-    vectors = len(shape) == 2 and shape[1] == 3
-    flat = len(shape) == 1 and shape[0] % 3 == 0
-    if not (vectors or flat) or not 1 <= argument.size // 3 <= most:
-        raise InputError(
-            f"--arguments: {argument.name} has the shape {list(shape)}; [3], [K][3] or [3 K] is needed, "
-            f"with K from 1 to {most}"
-        )
-
-
 def _result(text: str, parameters: list[ForeignArgument], memories: Collection[str]) -> ForeignArgument:
     """Return a result: the argument `next` or `state`, a field of memory, or a global array; or a translation."""
     what, equals, place = (part.strip() for part in text.partition("="))
@@ -272,95 +263,72 @@ def _result(text: str, parameters: list[ForeignArgument], memories: Collection[s
     meaning = what if equals else result.name.removeprefix(_NEXT)
     if equals and meaning not in TRANSLATIONS:
         raise InputError(f"--arguments: {shown(text)} names no result; allowed: {', '.join(TRANSLATIONS)}")
-    memories = {*memories, *(argument.name for argument in parameters if argument.type)}
-    head = result.name.partition(".")[0]
-    read_after = result.name.startswith("global ") or ("." in result.name and head in memories)
-    if result.name not in ARGUMENTS_OF_RESULTS and not read_after:
+    owner, dot, _ = result.name.partition(".")
+    of_memory = dot and owner in {*memories, *(argument.name for argument in parameters if argument.type)}
+    if not (result.name in ARGUMENTS_OF_RESULTS or result.name.startswith("global ") or of_memory):
         raise InputError(
             f"--arguments: the result {shown(text)} is not known; allowed: next[4], state[4], rotation[3], a field of "
             "memory, as name.q[4], or a global array, as global q[4]; in place of [4] also [9] and [3][3]; "
             f"and {', '.join(f'{name}[3]' for name in TRANSLATIONS)}, or as velocity = name.v[3]"
         )
+    allowed: tuple[tuple[int, ...], ...] = (*_ATTITUDES, (3,))
+    needed = "allowed: [4], [9], [3][3], or [3] of a rotation"
     if meaning in TRANSLATIONS:
-        if result.shape not in ((), (3,)):
-            raise InputError(f"--arguments: the result {shown(text)} has another shape; [3] is needed")
-        return replace(result, meaning=meaning)
-    vector = result.shape == (3,) and result.name not in (STATE, NEXT)
-    if result.shape and not vector and (result.shape not in ATTITUDES or result.name == ROTATION):
-        raise InputError(
-            f"--arguments: the result {shown(text)} has another shape; allowed: [4], [9], [3][3], or [3] of a rotation"
-        )
+        result, allowed, needed = replace(result, meaning=meaning), ((3,),), "[3] is needed"
+    elif result.name in _SHAPES:
+        allowed = _SHAPES[result.name]
+    if result.shape and result.shape not in allowed:
+        raise InputError(f"--arguments: the result {shown(text)} has another shape; {needed}")
     return result
 
 
-def _refuse_what_does_not_fit(parameters: Sequence[ForeignArgument], result: ForeignArgument) -> None:
-    names = [f"{argument.type} {argument.name}".strip() for argument in parameters]
-    names = [name for name in names if name not in (CONSTANT, ZEROS)]
-    if len(set(names)) < len(names):
-        raise InputError(f"--arguments: {', '.join(names)} name one thing twice; each is allowed once")
-    if len([name for name in names if name in SAMPLES]) != 1:
-        raise InputError(
-            f"--arguments: {', '.join(names)} lack the samples; increments[K][3] or rates[K][3] is needed"
-        )
-    state = next((argument for argument in parameters if argument.name == STATE and not argument.type), None)
-    if result.name == STATE and state is None:
-        raise InputError(
-            "--arguments: the result state stands behind the arrow alone; before it, it is needed too"
-        )
-    if (
-        state is not None
-        and state.size
-        and result.size
-        and (state.size != result.size or (result.name == STATE and state != result))
-    ):
-        raise InputError(
-            f"--arguments: state has {state.size} numbers in the shape {list(state.shape)}, the result {result.size} "
-            f"in {list(result.shape)}; they must agree"
-        )
-
-
-def _refuse_other_results(
-    parameters: Sequence[ForeignArgument],
-    attitudes: Sequence[ForeignArgument],
-    translations: Sequence[ForeignArgument],
-) -> None:
-    """Refuse results beside the attitude, and arguments, that say nothing without each other."""
+def _contradictions(
+    parameters: Sequence[ForeignArgument], result: ForeignArgument, translations: Sequence[ForeignArgument]
+) -> Iterator[str]:
+    """Yield why arguments and results do not go together."""
     meanings = [each.meaning for each in translations]
-    known = {argument.name: argument for argument in parameters}
+    known = {argument.name: argument for argument in parameters if not argument.type}
+    names = [f"{each.type} {each.name}".strip() for each in parameters if each.name not in (CONSTANT, ZEROS)]
+    samples, state = [known[name] for name in SAMPLES if name in known], known.get(STATE)
     pushes = [known[name] for name in PUSHES if name in known]
+    if len(set(names)) < len(names):
+        yield f"{', '.join(names)} name one thing twice; each is allowed once"
+    if len(samples) != 1:
+        yield f"{', '.join(names)} lack the samples; increments[K][3] or rates[K][3] is needed"
+    if result.name == STATE and state is None:
+        yield "the result state stands behind the arrow alone; before it, it is needed too"
+    differ = state and (state.size != result.size or (result.name == STATE and state != result))
+    if state and differ and state.size and result.size:
+        sizes = f"state has {state.size} numbers in the shape {list(state.shape)}, the result {result.size}"
+        yield f"{sizes} in {list(result.shape)}; they must agree"
     if len(set(meanings)) < len(meanings):
-        raise InputError("--arguments: a result stands twice behind the arrow; each is allowed once")
+        yield "a result stands twice behind the arrow; each is allowed once"
     if bool(meanings) != (len(pushes) == 1):
-        raise InputError(
-            "--arguments: velocity, position or velocity_change behind the arrow and one of velocity_increments[K][3] "
-            "and forces[K][3] before it need each other"
+        yield (
+            "velocity, position or velocity_change behind the arrow and one of velocity_increments[K][3] and "
+            "forces[K][3] before it need each other"
         )
-    samples = next(argument for argument in parameters if argument.name in SAMPLES)
-    if pushes and pushes[0].size and samples.size and pushes[0].size != samples.size:
-        raise InputError(
-            f"--arguments: {pushes[0].name} has {pushes[0].size} numbers, {samples.name} {samples.size}; "
-            "they must agree"
+    if pushes and pushes[0].size and samples[0].size and pushes[0].size != samples[0].size:
+        sizes = f"{pushes[0].name} has {pushes[0].size} numbers, {samples[0].name} {samples[0].size}"
+        yield f"{sizes}; they must agree"
+    if VELOCITY in meanings and (result.size == 3 or result.name in ("", ROTATION)):
+        yield (
+            "a velocity behind the arrow is in reference axes, and needs an attitude there; velocity_change[3] is "
+            "that of a call in body axes"
         )
-    if VELOCITY in meanings and (not attitudes or attitudes[0].size == 3 or attitudes[0].name == ROTATION):
-        raise InputError(
-            "--arguments: a velocity behind the arrow is in reference axes, and needs an attitude there; "
-            "velocity_change[3] is that of a call in body axes"
-        )
-    for name in (POSITION, GRAVITY, VELOCITY):
+    for name in (POSITION, GRAVITY):
         if (name in known or name in meanings) and VELOCITY not in meanings:
-            raise InputError(f"--arguments: {name} needs a velocity behind the arrow")
+            yield f"{name} needs a velocity behind the arrow"
     for name in (VELOCITY, POSITION):
         if name in [each.name for each in translations] and name not in known:
-            raise InputError(
-                f"--arguments: the result {name} stands behind the arrow alone; before it, it is needed too, or "
+            yield (
+                f"the result {name} stands behind the arrow alone; before it, it is needed too, or "
                 f"{_NEXT}{name}[3] behind it"
             )
+        if name in known and name not in meanings:
+            yield f"{name} stands before the arrow alone; behind it, it is needed too"
     if {VELOCITY, VELOCITY_CHANGE} <= {*meanings}:
-        raise InputError(
-            "--arguments: velocity and velocity_change are one result in two forms; one is allowed"
-        )
-    if POSITION in known and POSITION not in meanings:
-        raise InputError("--arguments: position stands before the arrow alone; behind it, it is needed too")
-    for name, without in ((STATE, ()), (FRAME_RATE, (ROTATION,))):
-        if name in known and [each for each in attitudes if each.name not in without] == []:
-            raise InputError(f"--arguments: {name} needs an attitude behind the arrow")
+        yield "velocity and velocity_change are one result in two forms; one is allowed"
+    for name, without in ((STATE, ("",)), (FRAME_RATE, ("", ROTATION))):
+        if name in known and result.name in without:
+            yield f"{name} needs an attitude behind the arrow"

@@ -16,7 +16,6 @@ from strapgen.firmware.check_code.foreign_arguments import (
     CONSTANT,
     MEMORY,
     PRECISIONS,
-    ZEROS,
     ForeignArgument,
     ForeignArguments,
     read_arguments,
@@ -92,7 +91,6 @@ class InterpretedSource:
             "type": self.precision,
             "parameters": parameters,
             "constants": constants,
-            "zeros": [each.size for each in arguments.parameters if each.name == ZEROS],
             "names": names,
             "fed": [(each.name, each.size) for each in arguments.fed],
             "results": [

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from fractions import Fraction
+from itertools import accumulate
 
 import numpy as np
 import sympy as sp
@@ -12,12 +13,11 @@ from numpy.typing import NDArray
 from strapgen import catalogue, pipeline
 from strapgen.catalogue.methods.coning_coefficients import FORMS, Design, design
 from strapgen.firmware.check_code.conformance import ORDER_WITHIN, Finding
-from strapgen.firmware.check_code.foreign import ENDS, ForeignStep, Segment, SegmentRun
+from strapgen.firmware.check_code.foreign import ENDS, ForeignStep, Segment, SegmentRun, rotations
 from strapgen.lab.convergence import MOST_ERROR, Convergence, fitted
 from strapgen.lab.motions.motions import GENERAL, Motion, motion
 from strapgen.lab.runs import drift_between, simulate
 from strapgen.run.backends import backend as attitude_backend
-from strapgen.run.backends import evaluator
 
 Array = NDArray[np.float64]
 #: The cone of the drift: half-angle in rad, frequency in rad/s, sampling interval in s, number of samples.
@@ -101,11 +101,8 @@ def linear_rates(segment: Segment) -> Array:
     starts = np.concatenate([np.zeros((1, 3)), ends[:-1]])
     coefficient = float(design(1, 1).pairs[0, 1])
     vectors = (starts + ends) / 2 + coefficient * np.cross(starts, ends)
-    turns = evaluator("dcm-update")(np.broadcast_to(np.eye(3), (len(vectors), 3, 3)), vectors)
-    relative = [np.eye(3)]
-    for turn in turns:
-        relative.append(relative[-1] @ turn)
-    return np.array(relative)[::samples][: count + 1]
+    relative = np.array([*accumulate(rotations(vectors), np.matmul, initial=np.eye(3))])
+    return relative[::samples][: count + 1]
 
 
 def ladder(step: ForeignStep, runs: tuple[SegmentRun, ...], standard: Design) -> Convergence:
@@ -133,18 +130,9 @@ def order_on_ladder(step: ForeignStep, seen: Convergence) -> tuple[Finding, floa
     )
     if seen.observed is None:
         errors = [rung.error_rad for rung in seen.rungs if rung.error_rad is not None]
-        holds = False if min(errors) > MOST_ERROR else None
-        return Finding("order", holds, f"{seen.hidden}; {words}"), None
-    return (
-        Finding(
-            "order",
-            seen.observed > needed - ORDER_WITHIN,
-            f"observed {seen.observed:.3f}; {words}",
-            seen.observed,
-            needed - ORDER_WITHIN,
-        ),
-        seen.observed,
-    )
+        return Finding("order", False if min(errors) > MOST_ERROR else None, f"{seen.hidden}; {words}"), None
+    least, text = needed - ORDER_WITHIN, f"observed {seen.observed:.3f}; {words}"
+    return Finding("order", seen.observed > least, text, seen.observed, least), seen.observed
 
 
 def order_in_float(

@@ -48,7 +48,7 @@ function run(folder, calls)
         known.dt_ms = 1e3 * row(2);
         known.dt_us = 1e6 * row(2);
         known.step = row(3);
-        known.zeros = zeros(3, 1);
+        known.zeros = zeros(9, 1);
         place = 4;
         for n = 1:numel(plan.fed)
             size = plan.fed{n}{2};
@@ -72,7 +72,7 @@ function run(folder, calls)
             if element >= 0
                 given{n} = cast(given{n}(element + 1), kind);
             elseif numel(shape) > 0
-                given{n} = cast(arranged(known.(name), shape), kind);
+                given{n} = cast(arranged(known.(name)(1:prod(shape)), shape), kind);
             end
             if numel(shape) == 2 && strcmp(name, 'state')
                 given{n} = given{n}.';

@@ -26,10 +26,10 @@ from strapgen.firmware.check_code.foreign import (
     Segment,
     SegmentRun,
     rotation_vectors,
+    rotations,
 )
 from strapgen.lab.motions.motions import motion
 from strapgen.lab.runs import drift_between
-from strapgen.run.backends import evaluator
 
 Array = NDArray[np.float64]
 Table = dict[tuple[int, int], float]
@@ -177,7 +177,11 @@ def products(step: ForeignStep, runs: Sequence[SegmentRun], *, exact: bool) -> P
 def _odd(turns: Array) -> Array:
     """Return the part about x, y, z of rotations (N, axes, signs, 3) that belongs to the cross product."""
     weights = np.array([first * second for first, second in _SIGNS])
-    odd = (turns * weights[:, None]).mean(axis=2)
+    return about_axes((turns * weights[:, None]).mean(axis=2))
+
+
+def about_axes(odd: Array) -> Array:
+    """Return the part about x, y, z (N, 3) of what cross products with `AXES` (N, axes, 3) make."""
     parts = np.zeros((len(odd), 3))
     for number, (_, _, axis, sign) in enumerate(AXES):
         parts[:, axis] += sign * odd[:, number, axis] / 2
@@ -186,14 +190,12 @@ def _odd(turns: Array) -> Array:
 
 def _exact_turns(small: float) -> Array:
     """Return the rotation vectors of exact products of rotations by two increments, (1, axes, signs, 3)."""
-    update = evaluator("dcm-update")
     vectors = np.zeros((2, len(AXES), len(_SIGNS), 3))
     for number, (older, newer, _, _) in enumerate(AXES):
         vectors[0, number, :, older] = small * np.array(_SIGNS)[:, 0]
         vectors[1, number, :, newer] = small * np.array(_SIGNS)[:, 1]
-    first, second = vectors.reshape(2, -1, 3)
-    turned = update(update(np.broadcast_to(np.eye(3), (len(first), 3, 3)), first), second)
-    return rotation_vectors(turned).reshape(1, len(AXES), len(_SIGNS), 3)
+    first, second = rotations(vectors.reshape(2, -1, 3))
+    return rotation_vectors(first @ second).reshape(1, len(AXES), len(_SIGNS), 3)
 
 
 #: Rotation below which a function does not turn at all, in units of the rotation.

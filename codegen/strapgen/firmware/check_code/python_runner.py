@@ -16,13 +16,14 @@ import os
 import sys
 import textwrap
 import traceback
+from contextlib import suppress
 from functools import reduce
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from strapgen.ir.checks import suggestions
+from strapgen.ir.checks import did_you_mean
 
 
 class _RefusedError(Exception):
@@ -79,9 +80,7 @@ def _found(module: Any, plan: dict[str, Any]) -> tuple[Any, Any]:
             names = [
                 one for one in vars(holder) if callable(getattr(holder, one)) and not one.startswith("_")
             ]
-            meant = suggestions("function", name, names)
-            guess = f" (did you mean {' or '.join(meant)}?)" if meant else ""
-            where = plan["file"] or plan["module"]
+            guess, where = did_you_mean("function", name, names), plan["file"] or plan["module"]
             raise _RefusedError(f"{where} has no {name}{guess}; it has {', '.join(names) or 'no function'}")
         owner, holder = holder, getattr(holder, name)
     if inspect.isclass(holder) or not callable(holder):
@@ -104,12 +103,19 @@ def _described(plan: dict[str, Any], module: Any, owner: Any, function: Any) -> 
         for each in parameters
         if each.default is not each.empty or each.kind in (each.VAR_POSITIONAL, each.VAR_KEYWORD)
     ]
+    fields: dict[str, int] = {}
+    try:
+        fields = {} if owner is None else _sizes(_begin(plan, module, owner, np.empty(0))[1])
+    except _RefusedError:
+        raise
+    except Exception:  # a call will say it
+        fields = {}
     return {
         "parameters": [f"{each.name}{'=' * (each.name in optional)}" for each in parameters],
         "returns": _returns(function),
         "owner": owner is not None,
-        "fields": {} if owner is None else _sizes(_begin(plan, module, owner, np.empty(0))[1]),
-        "variables": _sizes(module),
+        "fields": fields,
+        "variables": _sizes(module, levels=1),
     }
 
 
@@ -128,14 +134,17 @@ def _sizes(holder: Any, levels: int = 2) -> dict[str, int]:
     """Return how many numbers the variables of an object or a module have, those of inner objects included."""
     sizes = {}
     for name in dict.fromkeys([*getattr(holder, "__dict__", ()), *dir(holder)]):
-        value = None if name.startswith("__") else getattr(holder, name, None)
+        value = None
+        with suppress(Exception):  # of a property
+            value = None if name.startswith("__") else getattr(holder, name)
         if value is None or callable(value) or inspect.ismodule(value):
             continue
-        try:
-            sizes[name] = np.asarray(value.as_quat() if hasattr(value, "as_quat") else value, np.float64).size
-        except (TypeError, ValueError):
-            inner = _sizes(value, levels - 1) if levels > 1 and hasattr(value, "__dict__") else {}
-            sizes |= {f"{name}.{each}": size for each, size in inner.items()}
+        value = value.as_quat() if hasattr(value, "as_quat") else value
+        if isinstance(value, int | float | list | tuple) or hasattr(value, "__array__"):
+            with suppress(TypeError, ValueError):  # of words
+                sizes[name] = np.asarray(value, np.float64).size
+        elif levels > 1 and hasattr(value, "__dict__"):
+            sizes |= {f"{name}.{each}": size for each, size in _sizes(value, levels - 1).items()}
     return sizes
 
 
@@ -168,8 +177,7 @@ def _call(folder: Path, plan: dict[str, Any], module: Any, owner: Any, function:
                 held: state[slice(*ends[n : n + 2])] for n, (_, _, held, _) in enumerate(plan["results"])
             }
             known |= {"dt": row[1], "dt_ms": 1e3 * row[1], "dt_us": 1e6 * row[1], "step": row[2]}
-            known |= plan["constants"]
-            known["zeros"] = np.zeros(max(plan["zeros"], default=0))
+            known |= plan["constants"] | {"zeros": np.zeros(9)}
             given: list[Any] = [
                 _given(known[name], shape, element, kind) for name, shape, element in plan["parameters"]
             ]
@@ -205,13 +213,9 @@ def _given(numbers: Any, shape: list[int], element: int, kind: Any) -> Any:
     """Return an argument: an array, one element of it, or a number."""
     if element >= 0:
         return float(numbers[element])
-    return (
-        np.array(numbers, kind).reshape(shape)
-        if shape
-        else numbers
-        if isinstance(numbers, bool)
-        else float(numbers)
-    )
+    if shape:
+        return np.array(numbers[: np.prod(shape)], kind).reshape(shape)
+    return numbers if isinstance(numbers, bool) else float(numbers)
 
 
 def _results(
@@ -228,12 +232,11 @@ def _results(
     numbers = []
     for name, size, held, places in plan["results"]:
         if places:
-            of = [target if place.startswith("self.") else module for place in places]
-            read = [
-                _attribute(holder, place.removeprefix("self."))
-                for holder, place in zip(of, places, strict=True)
+            several_read = [
+                _attribute(target if place.startswith("self.") else module, place.removeprefix("self."))
+                for place in places
             ]
-            read = read if len(read) > 1 else read[0]
+            read = several_read if len(places) > 1 else several_read[0]
         else:
             read = given[name] if returned is None and name == held else several[name]
         numbers.append(_numbers(plan, read, size))

@@ -97,15 +97,12 @@ def joined(signature: Signature, text: str, reader: Reader) -> ForeignArguments:
 
 def _carried(signature: Signature, argument: ForeignArgument, left: list[Value]) -> ForeignArgument:
     """Return an argument with the parameters that carry it, which are taken from those that are left."""
+    returns = signature.returns if signature.returns and signature.returns.elements else None
+    by_return = ARGUMENTS_OF_RESULTS if returns and returns.open else (NEXT, ROTATION, VELOCITY_CHANGE)
+    if returns and argument.name in by_return and (not left or left[0].has_default):
+        value = replace(returns, passed="return")
+        return _sized(argument, (value.holding(argument.size or _usual(argument)),))
     if not left:
-        returns, alone = signature.returns, (NEXT, ROTATION, VELOCITY_CHANGE)
-        if (
-            returns
-            and returns.elements
-            and argument.name in (ARGUMENTS_OF_RESULTS if returns.open else alone)
-        ):
-            value = replace(returns, passed="return")
-            return _sized(argument, (value.holding(argument.size or _usual(argument)),))
         raise InputError(
             f"--arguments: {signature.name} takes no argument for {argument.name}; it takes "
             f"{', '.join(value.text for value in signature.parameters) or 'none'}"

@@ -3,28 +3,19 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
 
 from strapgen import pipeline
 from strapgen.catalogue.methods.coning_coefficients import Design
 from strapgen.firmware.check_code.ladder import published_step
 
 
-@dataclass(frozen=True)
-class Remedy:
-    """Generated code that corrects coning."""
-
-    #: The command that generates the whole step
-    command: str
-    #: Its lines from the samples to the rotation vector, in C
-    code: str
-
-
-def remedy(wanted: Design) -> Remedy:
+def remedy(wanted: Design) -> dict[str, str]:
     """Return the lines of the generated step with a published correction that compute its rotation vector.
 
+    Beside them is the command that generates the whole step; both have the names that a result gives them.
+
     >>> from strapgen.catalogue.methods.coning_coefficients import design
-    >>> print(remedy(design(2)).code.splitlines()[0])
+    >>> print(remedy(design(2))["replacement"].splitlines()[0])
     /* integral of the rate over the step */
     """
     # The combined step corrects more than coning.
@@ -37,4 +28,4 @@ def remedy(wanted: Design) -> Remedy:
     lines = [line.removeprefix("    ") for line in body[first:last].splitlines()]
     before = f" --previous {wanted.previous}" if wanted.previous else ""
     command = f"strapgen generate euler --method coning-{form} --increments {wanted.increments}{before}"
-    return Remedy(command, "\n".join(lines))
+    return {"replacement": "\n".join(lines), "replacement_command": command}

@@ -18,6 +18,7 @@ from strapgen.firmware.check_code.foreign import (
     Segment,
     SegmentRun,
     rotation_vectors,
+    rotations,
 )
 from strapgen.run.backends import evaluator
 
@@ -209,7 +210,7 @@ def _explanations(
     """Yield all explanations."""
     elements = states.shape[1]
     generators = np.array([_generator(convention, elements, vector) for vector in vectors])
-    true = evaluator("dcm-update")(np.broadcast_to(np.eye(3), (len(vectors), 3, 3)), vectors)
+    true = rotations(vectors)
     before = np.swapaxes(convention.matrices(states), -1, -2)
     size = np.linalg.norm(errors)
     for terms in (_EXACT, _FIRST):
@@ -282,40 +283,34 @@ def _possible_reads(convention: Convention, elements: int, needed: Array) -> Ite
 def _orthogonal(elements: int) -> Iterator[Callable[[Array], Array]]:
     """Yield the orthogonalizations of states; the first one, none, stands for the nearest rotation."""
     yield lambda states: states
-    if elements == 9:
-        for by_rows in (True, False):
-            for order in permutations(range(3)):
-                yield partial(_one_by_one, order=order, by_rows=by_rows)
-            for pair in combinations(range(3), 2):
-                yield partial(_by_pair, pair=pair, by_rows=by_rows)
+    for by_rows in (True, False) if elements == 9 else ():
+        for order in permutations(range(3)):
+            yield partial(_made_orthogonal, partial(_one_by_one, order), by_rows)
+        for pair in combinations(range(3), 2):
+            yield partial(_made_orthogonal, partial(_by_pair, pair), by_rows)
 
 
-def _rows(states: Array, by_rows: bool) -> Array:
+def _made_orthogonal(repair: Callable[[Array], None], by_rows: bool, states: Array) -> Array:
+    """Return matrices (N, 9) whose rows, or columns, are made orthogonal in place."""
     matrices = states.reshape(-1, 3, 3)
-    return np.array(matrices if by_rows else np.swapaxes(matrices, -1, -2))
+    rows = np.array(matrices if by_rows else np.swapaxes(matrices, -1, -2))
+    repair(rows)
+    return (rows if by_rows else np.swapaxes(rows, -1, -2)).reshape(-1, 9)
 
 
-def _states(matrices: Array, by_rows: bool) -> Array:
-    return (matrices if by_rows else np.swapaxes(matrices, -1, -2)).reshape(-1, 9)
-
-
-def _one_by_one(states: Array, order: tuple[int, ...], by_rows: bool) -> Array:
-    """Make rows or columns orthogonal one after the other (Gram-Schmidt)."""
-    rows = _rows(states, by_rows)
+def _one_by_one(order: tuple[int, ...], rows: Array) -> None:
+    """Make rows orthogonal one after the other (Gram-Schmidt)."""
     for number, k in enumerate(order):
         for j in order[:number]:
             rows[:, k] -= (rows[:, k] * rows[:, j]).sum(axis=-1, keepdims=True) * rows[:, j]
         rows[:, k] /= np.linalg.norm(rows[:, k], axis=-1, keepdims=True)
-    return _states(rows, by_rows)
 
 
-def _by_pair(states: Array, pair: tuple[int, int], by_rows: bool) -> Array:
-    """Make two rows or columns orthogonal, evenly, and the third their cross product."""
-    rows = _rows(states, by_rows)
+def _by_pair(pair: tuple[int, int], rows: Array) -> None:
+    """Make two rows orthogonal, evenly, and the third their cross product."""
     first, second = rows[:, pair[0]].copy(), rows[:, pair[1]].copy()
     half = (first * second).sum(axis=-1, keepdims=True) / 2
     for k, row in ((pair[0], first - half * second), (pair[1], second - half * first)):
         rows[:, k] = row / np.linalg.norm(row, axis=-1, keepdims=True)
     third = 3 - sum(pair)
     rows[:, third] = np.cross(rows[:, (third + 1) % 3], rows[:, (third + 2) % 3])
-    return _states(rows, by_rows)

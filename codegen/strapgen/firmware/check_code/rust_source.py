@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from strapgen.firmware.check_code.bridge import ForeignSource, read_source
-from strapgen.ir.checks import suggestions
+from strapgen.ir.checks import did_you_mean
 from strapgen.ir.exceptions import CompilerError, InputError
 from strapgen.run import compiler
 from strapgen.storage import cache
@@ -40,8 +40,7 @@ def rust_source(path: Path, function: str, *how: Any, **more: Any) -> ForeignSou
     )
     functions = {found[1]: found for found in _FUNCTION.finditer(text)}
     if function not in functions:
-        meant = suggestions("function", function, functions)
-        guess = f" (did you mean {' or '.join(meant)}?)" if meant else ""
+        guess = did_you_mean("function", function, functions)
         raise InputError(
             f'--function: {path} has no extern "C" fn {function}{guess}; it has {", ".join(functions) or "none"}'
         )

@@ -10,12 +10,12 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from strapgen.ir.checks import suggestions
+from strapgen.ir.checks import did_you_mean
 from strapgen.ir.exceptions import CompilerError, InputError, MissingExtraError
 from strapgen.run import compiler
 
-#: What reaches a number of an object of a class without public fields: it is tried for each.
-_ACCESS = (".x()", ".w()", "(0, 0)", "[0]", "(0)")
+#: What is tried for each expression: itself, and what reaches a number of an object without public fields.
+_ACCESS = ("", ".x()", ".w()", "(0, 0)", "[0]", "(0)")
 #: Names of elements of which one says that it is the scalar part, in the order in which they are taken.
 _NAMED = ("x", "y", "z", "w")
 #: Numbers of elements of what is no memory: a number, a vector, and an attitude.
@@ -98,9 +98,7 @@ class SourceReader:
     def __init__(self, file: SourceFile) -> None:
         self.file = file
         self.unit = self._parse("")
-        self.functions = [
-            (name, cursor) for name, cursor in _functions(self.unit.cursor, "") if not _of_system(cursor)
-        ]
+        self.functions = [*_walk(self.unit.cursor, ("FUNCTION_DECL", "CXX_METHOD"), (*_CLASSES, *_OPEN))]
 
     def _parse(self, text: str) -> Any:
         try:
@@ -139,8 +137,7 @@ class SourceReader:
         found = exact or found
         if not found:
             names = list(dict.fromkeys(full for full, cursor in self.functions if self._is_own(cursor)))
-            meant = suggestions("function", name, names)
-            guess = f" (did you mean {' or '.join(meant)}?)" if meant else ""
+            guess = did_you_mean("function", name, names)
             raise CompilerError(
                 f"{option}: {self.file.path} has no function {name}{guess}; it has {', '.join(names[:20]) or 'none'}"
             )
@@ -166,31 +163,16 @@ class SourceReader:
     def values(self, types: Sequence[tuple[str, str, Any]]) -> list[Value]:
         """Return what variables are, by their names, their declarations, and their types of libclang."""
         plain = [_Declared.of(kind) for _, _, kind in types]
-        lines = [
-            f"extern {each.type} {'&' if self.file.is_cpp else ''}strapgen_{k};" if each.is_record else ""
+        sign = "&" if self.file.is_cpp else ""
+        before = [f"extern {each.type} {sign}strapgen_{k};" for k, each in enumerate(plain) if each.is_record]
+        places = [
+            f"strapgen_{k}{access}" for k, each in enumerate(plain) if each.is_record for access in _ACCESS
+        ]
+        known = self.expressions(places, before)
+        return [
+            each.value(*types[k][:2], known.get(f"strapgen_{k}"), f"strapgen_{k}", known)
             for k, each in enumerate(plain)
         ]
-        known = self.expressions(
-            [
-                f"strapgen_{k}{access}"
-                for k, each in enumerate(plain)
-                if each.is_record
-                for access in ("", *_ACCESS)
-            ],
-            [line for line in lines if line],
-        )
-        values = []
-        for k, ((name, text, _), each) in enumerate(zip(types, plain, strict=True)):
-            numbers = _numbers(known.get(f"strapgen_{k}") or each.kind, f"strapgen_{k}", known)
-            shape = each.shape
-            places = tuple(index + end for index in _indices(shape) for end in numbers.elements)
-            values.append(
-                Value(
-                    *(name, text, each.type, shape, each.passed, each.written),
-                    *(places, numbers.number, numbers.named, each.open),
-                )
-            )
-        return values
 
     def expressions(self, texts: Iterable[str], before: Sequence[str] = ()) -> dict[str, Any]:
         """Return the types of libclang of those expressions that have one, by their text."""
@@ -221,17 +203,14 @@ class SourceReader:
     def results(self, places: Iterable[str], before: Sequence[str] = ()) -> dict[str, Value]:
         """Return what expressions are that are read after a call, by their text, without those that are nothing."""
         places = list(places)
-        known = self.expressions([place + access for place in places for access in ("", *_ACCESS)], before)
-        found = {}
-        for place in places:
-            if place in known:
-                each = _Declared.of(known[place])
-                numbers = _numbers(each.kind, place, known)
-                ends = tuple(index + end for index in _indices(each.shape) for end in numbers.elements)
-                found[place] = Value(
-                    *(place, place, each.type, each.shape, "", True), *(ends, numbers.number, numbers.named)
-                )
-        return found
+        known = self.expressions([place + access for place in places for access in _ACCESS], before)
+        return {
+            place: replace(
+                _Declared.of(known[place]).value(place, place, None, place, known), passed="", written=True
+            )
+            for place in places
+            if place in known
+        }
 
     def fields(self, name: str, before: Sequence[str]) -> list[tuple[str, bool]]:
         """Return fields of an object and its methods that take nothing, each with whether it is public."""
@@ -240,7 +219,8 @@ class SourceReader:
 
     def variables(self) -> list[str]:
         """Return the names of the variables that the file declares outside of functions."""
-        return [full for full, cursor in _variables(self.unit.cursor, "") if self._is_own(cursor)]
+        known = _walk(self.unit.cursor, ("VAR_DECL",), ("NAMESPACE", *_OPEN))
+        return [full for full, cursor in known if self._is_own(cursor)]
 
     def _is_own(self, cursor: Any) -> bool:
         file = cursor.location.file
@@ -279,6 +259,13 @@ class _Declared:
     @property
     def is_record(self) -> bool:
         return bool(self.kind.kind.name == "RECORD")
+
+    def value(self, name: str, text: str, kind: Any, expression: str, known: dict[str, Any]) -> Value:
+        """Return a value of this type, or of one that libclang knows better, with the types of what reaches numbers."""
+        numbers = _numbers(kind or self.kind, expression, known)
+        places = tuple(index + end for index in _indices(self.shape) for end in numbers.elements)
+        how = (self.type, self.shape, self.passed, self.written)
+        return Value(name, text, *how, places, numbers.number, numbers.named, self.open)
 
 
 @dataclass(frozen=True)
@@ -339,7 +326,7 @@ def _of_fields(kind: Any, expression: str, known: dict[str, Any]) -> _Numbers | 
 
 def _of_access(kind: Any, expression: str, known: dict[str, Any]) -> _Numbers:
     """Return the numbers of an object of a class by its methods and operators."""
-    x, w, pair, index, call = (known.get(expression + access) for access in _ACCESS)
+    x, w, pair, index, call = (known.get(expression + access) for access in _ACCESS[1:])
     one = index or call or x or pair
     if one is None or one.kind.name not in ("FLOAT", "DOUBLE"):
         return _Numbers()
@@ -364,38 +351,26 @@ def _indices(shape: Sequence[int]) -> list[str]:
     return indices
 
 
-_SCOPES = ("NAMESPACE", "CLASS_DECL", "STRUCT_DECL", "LINKAGE_SPEC", "UNEXPOSED_DECL")
+_CLASSES = ("NAMESPACE", "CLASS_DECL", "STRUCT_DECL")
+_OPEN = ("LINKAGE_SPEC", "UNEXPOSED_DECL")
 
 
-def _walk(cursor: Any, scope: str, kinds: Sequence[str], scopes: Sequence[str]) -> Iterator[tuple[str, Any]]:
+def _walk(cursor: Any, kinds: Sequence[str], scopes: Sequence[str]) -> Iterator[tuple[str, Any]]:
+    """Yield declarations outside of the system's headers with the names that the file calls them by."""
     for child in cursor.get_children():
-        kind = child.kind.name
-        if kind in kinds:
-            yield f"{scope}{child.spelling}", child
-        elif kind in scopes and not _of_system(child):
-            inner = f"{scope}{child.spelling}::" if kind in _SCOPES[:3] and child.spelling else scope
-            yield from _walk(child, inner, kinds, scopes)
-
-
-def _functions(cursor: Any, scope: str) -> Iterator[tuple[str, Any]]:
-    for name, child in _walk(cursor, scope, ("FUNCTION_DECL", "CXX_METHOD"), _SCOPES):
-        parent = child.semantic_parent
-        outside = parent is not None and child.lexical_parent != parent and parent.kind.name in _SCOPES[:3]
-        yield (f"{_qualified(parent)}::{child.spelling}" if outside else name), child
+        if _of_system(child):
+            continue
+        if child.kind.name in kinds:
+            yield _qualified(child), child
+        elif child.kind.name in scopes:
+            yield from _walk(child, kinds, scopes)
 
 
 def _qualified(cursor: Any) -> str:
-    names = []
-    while cursor is not None and cursor.kind.name in _SCOPES[:3]:
-        names.append(cursor.spelling)
-        cursor = cursor.semantic_parent
+    names = [cursor.spelling]
+    while (cursor := cursor.semantic_parent) is not None and cursor.kind.name in (*_CLASSES, *_OPEN):
+        names += [cursor.spelling] if cursor.kind.name in _CLASSES else []
     return "::".join(filter(None, reversed(names)))
-
-
-def _variables(cursor: Any, scope: str) -> Iterator[tuple[str, Any]]:
-    for name, child in _walk(cursor, scope, ("VAR_DECL",), ("NAMESPACE", *_SCOPES[3:])):
-        if not _of_system(child):
-            yield name, child
 
 
 def _fields(kind: Any, expression: str, levels: int, *, public: bool = True) -> Iterator[tuple[str, bool]]:

@@ -65,8 +65,7 @@ def _fast(step: ForeignStep, convention: Convention, rotates: bool) -> tuple[Fin
     calls = np.ones((_FAST_CALLS, step.samples, 3)) * float(step.interval)
     done, parts = step.outputs([Segment(calls * rate) for rate in fed], convention)
     if done.stopped:
-        text = f"at {rates[0]:.3g} rad/s {done.stopped}"
-        return Finding("fast", False, text), text
+        return _stopped("fast", f"at {rates[0]:.3g} rad/s {done.stopped}")
     off = []
     for rate, part in zip(fed, parts, strict=True):
         matrices = convention.matrices(part[step.settling :, : step.source.arguments.elements])
@@ -111,9 +110,9 @@ def _intervals(step: ForeignStep, convention: Convention) -> Iterator[tuple[Find
     }
     done, parts = step.outputs([*cases.values()], convention)
     if done.stopped:
-        held = None if _is_exception(done.stopped) else False
-        text = f"with an interval of 0, of {-whole:g} s or of {_LONGEST:g} s {done.stopped}"
-        yield Finding("dropouts", held, text), text if held is False else ""
+        yield _stopped(
+            "dropouts", f"with an interval of 0, of {-whole:g} s or of {_LONGEST:g} s {done.stopped}"
+        )
         return
     moved, usual = (_change(step, part) for part in parts[:2])
     off, allowed = float(np.abs(moved).max()), _STILL * step.unit
@@ -124,12 +123,11 @@ def _intervals(step: ForeignStep, convention: Convention) -> Iterator[tuple[Find
         holds, text = None, f"{text}, as it does at any dt"
     cause = text if holds is False else ""
     yield Finding("dt of 0", holds, text, off if np.isfinite(off) else None, allowed), cause
-    others = [*zip(cases, parts, strict=True)][2:]
-    said = [f"dt of {name}: {_said(step, convention, part)}" for name, part in others]
-    turned = [_part_of_a_call(step, convention, part) for _, part in others]
-    unused = of_rates and all(abs(part - 1) < _ALIKE for part in turned)
+    others = {name: _said(step, convention, part) for name, part in [*zip(cases, parts, strict=True)][2:]}
+    unused = of_rates and all(abs(part - 1) < _ALIKE for _, part in others.values())
     cause = "dt is an argument, and is not used" if unused else ""
-    yield Finding("dropouts", False if unused else None, "; ".join(said)), cause
+    text = "; ".join(f"dt of {name}: {words}" for name, (words, _) in others.items())
+    yield Finding("dropouts", False if unused else None, text), cause
 
 
 def _change(step: ForeignStep, outputs: Array) -> Array:
@@ -139,41 +137,27 @@ def _change(step: ForeignStep, outputs: Array) -> Array:
     return change
 
 
-def _turns(step: ForeignStep, convention: Convention, outputs: Array) -> tuple[Array, Array, Array]:
-    """Return the rotations of the calls before an upset, of that call, and of the last one, rad, body axes."""
-    matrices = convention.matrices(outputs[step.settling :, : step.source.arguments.elements])
+def _said(step: ForeignStep, convention: Convention, outputs: Array) -> tuple[str, float]:
+    """Return in words what a call with another interval did, and how much of a usual call's rotation it makes."""
+    outputs = outputs[step.settling :, : step.source.arguments.elements]
+    in_call, in_the_end = (np.isfinite(outputs[k]).all() for k in (_CALLS, -1))
+    if not (in_call and in_the_end):
+        words = "NaN in later calls" if in_call else "NaN, then it recovers" if in_the_end else "NaN"
+        return words, float("nan")
+    matrices = convention.matrices(outputs)
     before, at, after = (
         rotation_vectors(matrices[k - 1].T @ matrices[k]) for k in (_CALLS - 1, _CALLS, len(matrices) - 1)
     )
-    return before, at, after
-
-
-def _part_of_a_call(step: ForeignStep, convention: Convention, outputs: Array) -> float:
-    """Return how much of a usual call's rotation an upset call makes; NaN where it is not finite."""
-    if not np.isfinite(outputs).all():
-        return float("nan")
-    before, at, _ = _turns(step, convention, outputs)
-    return float(at @ before) / float(before @ before)
-
-
-def _said(step: ForeignStep, convention: Convention, outputs: Array) -> str:
-    """Return in words what a call with another interval did, beside the steady calls before it."""
-    rows, elements = outputs, step.source.arguments.elements
-    outputs = outputs[step.settling :, :elements]
-    if not np.isfinite(outputs[_CALLS]).all():
-        return "NaN" if not np.isfinite(outputs[-1]).all() else "NaN, then it recovers"
-    if not np.isfinite(outputs[-1]).all():
-        return "NaN in later calls"
-    before, at, after = _turns(step, convention, rows)
     part = float(at @ before) / float(before @ before)
     frozen = float(np.linalg.norm(after)) < _ALIKE * float(np.linalg.norm(before))
     words = "the attitude stays" if abs(part) < _ALIKE else f"it turns by {part:.3g} of a usual call"
-    return f"{words}, then freezes" if frozen else words
+    return f"{words}{', then freezes' * frozen}", part
 
 
-def _is_exception(stopped: str) -> bool:
-    """Return whether a function refused its input by an exception, which its caller may handle."""
-    return stopped.startswith("it raises")
+def _stopped(name: str, text: str) -> tuple[Finding, str]:
+    """Return the finding on a run that stopped: a fault, but for an exception at wrong input, which one may handle."""
+    held = None if " it raises " in text and name in ("dropouts", "NaN") else False
+    return Finding(name, held, text), "" if held is None else text
 
 
 def _not_a_number(step: ForeignStep, convention: Convention) -> tuple[Finding, str]:
@@ -182,9 +166,7 @@ def _not_a_number(step: ForeignStep, convention: Convention) -> tuple[Finding, s
     increments[_CALLS, 0, 0] = np.nan
     done, parts = step.outputs([Segment(increments)], convention)
     if done.stopped:
-        held = None if _is_exception(done.stopped) else False
-        text = f"at a NaN in one sample {done.stopped}"
-        return Finding("NaN", held, text), text if held is False else ""
+        return _stopped("NaN", f"at a NaN in one sample {done.stopped}")
     finite = np.array([np.isfinite(row).all() for row in parts[0][step.settling + _CALLS :]])
     if finite.all():
         text = "a NaN in one sample does not reach the attitude"
@@ -205,8 +187,7 @@ def _long_run(step: ForeignStep, convention: Convention) -> tuple[Finding, str]:
     done, parts = step.outputs([Segment(increments, settled=False)], convention)
     calls = f"in {len(increments)} calls"
     if done.stopped:
-        text = f"{calls} {done.stopped}"
-        return Finding("long run", False, text), text
+        return _stopped("long run", f"{calls} {done.stopped}")
     states = np.vstack([parts[0][::_READ], parts[0][-1:]])[:, : step.source.arguments.elements]
     if not np.isfinite(states).all():
         text = f"{calls} the attitude becomes infinite or NaN"

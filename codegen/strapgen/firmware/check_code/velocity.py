@@ -22,9 +22,18 @@ from strapgen import catalogue
 from strapgen.analysis.vibration import assessment
 from strapgen.catalogue.methods.coning_coefficients import Design
 from strapgen.firmware.check_code import ladder
-from strapgen.firmware.check_code.foreign import ForeignStep, Segment, SegmentRun
+from strapgen.firmware.check_code.foreign import ForeignStep, Segment, SegmentRun, rotations
 from strapgen.firmware.check_code.foreign_arguments import POSITION, VELOCITY
-from strapgen.firmware.check_code.probes import AXES, BEFORE, LATE, Products, Table, pairs, small_turn
+from strapgen.firmware.check_code.probes import (
+    AXES,
+    BEFORE,
+    LATE,
+    Products,
+    Table,
+    about_axes,
+    pairs,
+    small_turn,
+)
 from strapgen.lab.convergence import MOST_ERROR, Convergence, fitted
 from strapgen.lab.motions.motions import Motion, motion
 from strapgen.lab.motions.specific_forces import SpecificForce, force
@@ -211,10 +220,7 @@ class Velocity:
         velocity = self._due_to_force(run, VELOCITY)
         if not self._frame.any():
             return velocity
-        counts = np.arange(len(velocity))[:, None]
-        back = evaluator("dcm-update")(
-            np.broadcast_to(np.eye(3), (len(velocity), 3, 3)), -counts * self._frame
-        )
+        back = rotations(-np.arange(len(velocity))[:, None] * self._frame)
         places = np.cumsum((velocity[1:] + velocity[:-1]) / 2, axis=0)
         velocity[1:] += (round(self.turns) - 1) * np.cross(-self._frame, places)
         turned: Array = np.einsum("nij,nj->ni", back, velocity)
@@ -282,12 +288,10 @@ class Velocity:
             ]
         ).reshape(len(known), len(AXES), 2, -1, 3)
         odd = (changes[:, :, 0] - changes[:, :, 1]) / (2 * small * self.push)
-        tables = []
-        for call in (-(-BEFORE // count) + 1, -1):
-            about = np.zeros((len(known), 3))
-            for number, (_, _, axis, sign) in enumerate(AXES):
-                about[:, axis] += sign * odd[:, number, call, axis] / 2
-            tables.append(dict(zip(known, about, strict=True)))
+        tables = [
+            dict(zip(known, about_axes(odd[:, :, call]), strict=True))
+            for call in (-(-BEFORE // count) + 1, -1)
+        ]
         sides: tuple[Table, Table] = ({}, {})
         for older, newer in pairs(count):
             even = 1.0 if older < 0 else 0.5  # of an earlier call, its attitude turns the push
@@ -320,9 +324,10 @@ class Velocity:
 
     def _third_order(self) -> float:
         angle = self._large
-        along = []
-        for run, segment in zip(self._runs["third"], self.segments["third"], strict=True):
-            along.append(self._velocity(run, _turned(segment.increments))[1, 1] / self.push)
+        along = [
+            self._velocity(run, _turned(segment.increments))[1, 1] / self.push
+            for run, segment in zip(self._runs["third"], self.segments["third"], strict=True)
+        ]
         return float(1 - np.mean(along)) / angle**2
 
     def _turns(self, coasts: Sequence[SegmentRun]) -> float:
@@ -417,9 +422,7 @@ def _turned(increments: Array) -> Array:
     for call in range(increments.shape[-3]):
         after = attitudes[-1]
         for sample in range(increments.shape[-2]):
-            after = after @ evaluator("dcm-update")(
-                np.broadcast_to(np.eye(3), after.shape), increments[..., call, sample, :]
-            )
+            after = after @ rotations(increments[..., call, sample, :])
         attitudes.append(after)
     return np.stack(attitudes, axis=-3)
 

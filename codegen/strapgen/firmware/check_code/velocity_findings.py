@@ -81,7 +81,7 @@ class VelocityFindings:
         self.step = velocity.step
         self.causes: list[str] = []
         #: How sure the cause of wrong coefficients is, and what explains them next best
-        self.sure: tuple[float, str] | None = None
+        self.sure: dict[str, float | str] = {}
         self._known: dict[str, Any] = {}
         #: (3,): rotation vector by which a call turns the attitude of a resting body, reference axes
         self.frame: Array = np.zeros(3)
@@ -151,38 +151,36 @@ class VelocityFindings:
     def _force(self, pushed: Pushed) -> Finding:
         """Return the finding on a push without rotation, at an attitude that is none of the axes."""
         off = float(np.abs(pushed.at_once - pushed.true).max())
+        factor, interval = float((pushed.at_once * pushed.true).sum()) / 3, float(self.step.interval)
+        known = {
+            "the force acts a call late": pushed.later - pushed.true,
+            "the force is turned by the transposed attitude": pushed.at_once - pushed.true.T,
+            "the force is turned by no attitude": pushed.at_once - np.eye(3),
+        }
+        sizes = {
+            "the force has the wrong sign": -1.0,
+            "velocity increments are multiplied by the sampling interval": interval,
+            "forces are not multiplied by the sampling interval": 1 / interval,
+        }
         if off < SIZE_WITHIN:
             return Finding("force", True, "a push is added to the velocity, turned to reference axes", off)
-        if np.abs(pushed.later - pushed.true).max() < SIZE_WITHIN:
-            return self._failed("force", "the force acts a call late", off)
-        factor = float((pushed.at_once * pushed.true).sum()) / 3
-        interval = float(self.step.interval)
-        known = {
-            -1.0: "the force has the wrong sign",
-            interval: "velocity increments are multiplied by the sampling interval",
-            1 / interval: "forces are not multiplied by the sampling interval",
-        }
-        for other, said in ((pushed.true.T, "by the transposed attitude"), (np.eye(3), "by no attitude")):
-            if np.abs(pushed.at_once - other).max() < SIZE_WITHIN:
-                return self._failed("force", f"the force is turned {said}", off)
+        said = [words for words, left in known.items() if np.abs(left).max() < SIZE_WITHIN]
         if np.abs(pushed.at_once - factor * pushed.true).max() > DIRECTION_WITHIN * abs(factor):
-            return self._failed("force", "a push changes the velocity along other axes", off)
-        for value, said in known.items():
-            if abs(factor / value - 1) < SIZE_WITHIN:
-                return self._failed("force", said, off)
-        return self._failed("force", f"a push comes out {factor:.4g} times as large as it is fed", off)
+            said.append("a push changes the velocity along other axes")
+        said += [words for words, value in sizes.items() if abs(factor / value - 1) < SIZE_WITHIN]
+        text = f"a push comes out {factor:.4g} times as large as it is fed"
+        return self._failed("force", [*said, text][0], off)
 
     def _coriolis(self) -> Finding:
         """Return the finding on a velocity in a frame that moves."""
         turns = self.velocity.turns
         text = f"the velocity turns {turns:.3g} times with the frame; 1 if it is inertial, 2 if relative to the frame"
-        if min(abs(turns - 1), abs(turns - 2)) <= _TURNS_WITHIN:
-            return Finding("coriolis", True, text, turns)
-        if abs(turns) <= _TURNS_WITHIN:
-            self.causes.append(TURNS_NOT)
-        else:
-            self.causes.append(TURNS_BACK if turns < 0 else text)
-        return Finding("coriolis", False, text, turns)
+        holds = min(abs(turns - 1), abs(turns - 2)) <= _TURNS_WITHIN
+        if not holds:
+            self.causes.append(
+                TURNS_NOT if abs(turns) <= _TURNS_WITHIN else TURNS_BACK if turns < 0 else text
+            )
+        return Finding("coriolis", holds, text, turns)
 
     def _position(self, weight: float, advance: float) -> Finding:
         """Return the finding on the velocity by which the position advances."""
@@ -190,10 +188,10 @@ class VelocityFindings:
             text = f"the position advances by {advance:.4g} times the velocity and the duration of a call"
             return self._failed("position", text, advance)
         text = f"the position advances by the velocity with {weight:.4g} of the change in a call; wanted 0.5"
-        if abs(weight - 0.5) > SIZE_WITHIN:
-            said = {1.0: AT_THE_END, 0.0: AT_THE_START}.get(round(weight, 2), text)
-            self.causes.append(said)
-        return Finding("position", abs(weight - 0.5) <= SIZE_WITHIN, text, weight, 0.5)
+        holds = abs(weight - 0.5) <= SIZE_WITHIN
+        if not holds:
+            self.causes.append({1.0: AT_THE_END, 0.0: AT_THE_START}.get(round(weight, 2), text))
+        return Finding("position", holds, text, weight, 0.5)
 
     def _increment_rotation(self, turned: TurnedPush) -> Finding:
         """Return the finding on the part of the velocity that a rotation in the call makes."""
@@ -212,14 +210,15 @@ class VelocityFindings:
         self._known["sculling_coefficients"] = shown
         self._known["sculling_ratio"] = ratio = coning_causes.ratio(known)
         one_sided = self._one_sided(turned)
-        said = one_sided or coning_causes.cause(known)
+        is_open = any(cause.startswith(NO_FAULT) for cause in self.causes)  # then the odd part says nothing
+        said = one_sided or (None if is_open else coning_causes.cause(known))
         if said:
             self.causes.append(
                 f"sculling{' ' if said.startswith('correction') else ': '}{said}".replace(
                     "coning", "sculling"
                 )
             )
-            self.sure = None if one_sided else coning_causes.confidence(known, said)
+            self.sure = {} if one_sided else coning_causes.sureness(known, said)
         holds = coning_causes.corrects_coning(known)
         text = coning_causes.in_words(known, "sculling")
         return Finding("sculling", holds, text, ratio, coning_causes.tolerance(known))
@@ -264,7 +263,7 @@ class VelocityFindings:
         text += f"; limit {least + hidden:.4g}"
         if hidden > least / 100:
             text += f", of which {self.step.rounding} hides {hidden:.2g}"
-        return Finding("velocity drift", size <= least + hidden, text, size, least + hidden)
+        return Finding.within("velocity drift", text, size, least + hidden)
 
 
 def _order(name: str, seen: Convergence, error: str, generated: str) -> Finding:
