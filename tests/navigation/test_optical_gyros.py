@@ -1,4 +1,4 @@
-"""Gyros of light: printed numbers, lock-in against the equation of its beams, and the signal of a fibre."""
+"""Optical gyros: printed numbers, lock-in against the equation of its beams, and the signal of a fibre."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Gyros of light: scale factors of the ring laser and the fibre, its signal without a loop, and lock-in.
+"""Optical gyros: scale factors of the ring laser and the fibre, its signal without a loop, and lock-in.
 
 The ring turns a fringe for every angle `ring_fringe_angle`, and the loop of a fibre gyro a cycle for every
 `fibre_count_angle`: with such a quantum the kernel ``angle-counts`` makes angle increments of both.
