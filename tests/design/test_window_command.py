@@ -291,7 +291,7 @@ def test_files_are_those_of_the_library_and_are_in_step(run, tmp_path):
     assert status == 0
     assert said.split()[:3] == ["euler_late_3_3", "for", "c"]
     assert {path.name: path.read_text() for path in (tmp_path / "out").iterdir()} == files
-    assert run(f"{command} --check") == (0, "", "")
+    assert run(f"{command} --check") == (0, "out: 8 files, in step\n", "")
     (tmp_path / "out" / "euler_late_3_3.c").write_text("/* mine */\n")
     status, said, _ = run(f"{command} --check")
     assert status == 1
