@@ -75,6 +75,9 @@ OBJECTS: dict[str, Callable[[], Any]] = {
     "Backend": stepper,
     "Evaluator": lambda: strapgen.evaluator("euler-from-dcm"),
     "CommitLate": lambda: strapgen.CommitLate("window-3-3"),
+    "KalmanFilter": lambda: strapgen.kalman(
+        Path(__file__).parents[1] / "examples" / "kalman" / "gyrocompass.toml"
+    ),
     "GapError": lambda: strapgen.GapError("a sample is lost"),
     "SampleKind": lambda: next(iter(strapgen.SampleKind)),
     "SystemRunner": lambda: strapgen.system_runner(strapgen.read_system("two-speed-euler")),

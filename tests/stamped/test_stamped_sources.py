@@ -166,7 +166,7 @@ def test_the_command_says_what_it_has_written(run, tmp_path):
     assert status == 0
     assert text.startswith("imu for c: a sample of the grid is known 14 samples after its end\n  out/imu.h\n")
     command = "stamped --sample-hz 200 --tick-hz 1e6 --pairs 7,7 --name imu --out out"
-    assert run(f"{command} --check") == (0, "", "")
+    assert run(f"{command} --check") == (0, "out: 8 files, in step\n", "")
     (tmp_path / "out" / "imu.c").write_text("changed\n")
     status, difference, _ = run(f"{command} --check")
     assert (status, difference.startswith("---")) == (1, True)

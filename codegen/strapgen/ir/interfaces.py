@@ -251,7 +251,7 @@ class StepRounding:
 
 
 @dataclass(frozen=True)
-class AnyOrder:
+class AnyOrder(ReadOnly):
     """Bounds in any order of the operations, contracted or not, with numbers near zero flushed to it or not.
 
     Parameters

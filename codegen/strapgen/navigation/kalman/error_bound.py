@@ -8,7 +8,7 @@ added to r; sums are rounded up.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
@@ -157,7 +157,7 @@ def _doubles(matrix: sp.Matrix) -> Array:
     return np.array([[float(x) for x in matrix[i, :]] for i in range(matrix.rows)])
 
 
-def _gain_errors(interface: Interface, row: list[Fraction]) -> Any:
+def _gain_errors(interface: Interface, row: Sequence[Fraction]) -> Any:
     """Return by how much the gains of a row differ from those in the formats of the code."""
     taken = [one for one in interface.inputs if one.signal.name.startswith("gain_")]
     if not taken:

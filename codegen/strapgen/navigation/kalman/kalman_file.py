@@ -16,6 +16,7 @@ import sympy as sp
 from strapgen.catalogue.toml_models import Key, UserFile, parse, rational, refused
 from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError
+from strapgen.ir.read_only import ReadOnly
 from strapgen.kernel.algebra import exact
 from strapgen.kernel.kernel import DIGITS
 from strapgen.kernel.reading import CONSTANTS, FUNCTIONS, expression
@@ -157,7 +158,7 @@ class Quantity:
 
 
 @dataclass(frozen=True)
-class FilterText:
+class FilterText(ReadOnly):
     """A filter as its file states it, in exact numbers and expressions."""
 
     name: str

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -18,6 +18,7 @@ from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.formats import Format
 from strapgen.ir.notebook_display import Records, short_repr
 from strapgen.ir.program import Program
+from strapgen.ir.read_only import read_only
 from strapgen.ir.sources import Sources
 from strapgen.kernel.kernel import Kernel
 from strapgen.navigation.kalman import FORMS, kalman_file, riccati
@@ -126,12 +127,14 @@ class KalmanFilter(FilterModel):
         return stored("kalman-gains", [repr(self.text)], lambda: solve(self))
 
     @cached_property
-    def gains(self) -> dict[str, Array] | None:
+    def gains(self) -> Mapping[str, Array] | None:
         """Gains in double by the measurement: (n,) if steady, (rows, n) if scheduled, None if online."""
         if self.solved is None:
             return None
         rows = {name: np.array(one, float) for name, one in self.solved.rows.items()}
-        return {name: one[0] for name, one in rows.items()} if self.text.kind == "steady" else rows
+        if self.text.kind == "steady":
+            rows = {name: one[0] for name, one in rows.items()}
+        return cast("Mapping[str, Array]", read_only(rows))
 
     def kernels(self, form: str | None = None) -> list[Kernel]:
         """Return the kernels, the time update first; `form` takes the place of that of the filter."""
@@ -145,12 +148,12 @@ class KalmanFilter(FilterModel):
         return KalmanFilter(replace(self.text, form=form))
 
     @cached_property
-    def programs(self) -> list[Program]:
+    def programs(self) -> tuple[Program, ...]:
         """The programs of the kernels, from the cache."""
         return stored(
             "kalman-programs",
             [repr(self.text)],
-            lambda: [pipeline.lower(kernel) for kernel in self.kernels()],
+            lambda: tuple(pipeline.lower(kernel) for kernel in self.kernels()),
         )
 
     def sources(self, target: str, settings: Settings | None = None) -> list[Sources]:

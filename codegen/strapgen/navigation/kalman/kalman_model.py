@@ -119,18 +119,21 @@ class FilterModel:
     @cached_property
     def F(self) -> sp.Matrix:
         """Derivatives of f by the states."""
-        return self.f.jacobian(self.x)
+        return self.f.jacobian(self.x).as_immutable()
 
     @cached_property
     def G(self) -> sp.Matrix:
         """Factors of the noise, a column each."""
         derivatives = sp.Matrix([one.expression for one in self.text.states])
-        return derivatives.jacobian(list(self.text.noise)) if self.text.noise else sp.zeros(len(self.x), 0)
+        if not self.text.noise:
+            return sp.ImmutableMatrix.zeros(len(self.x), 0)
+        return derivatives.jacobian(list(self.text.noise)).as_immutable()
 
     @cached_property
     def H(self) -> sp.Matrix:
         """Derivatives of the measurements by the states, a row each."""
-        return sp.Matrix([one.expression for one in self.text.measurements]).jacobian(self.x)
+        expressions = [one.expression for one in self.text.measurements]
+        return sp.Matrix(expressions).jacobian(self.x).as_immutable()
 
     @cached_property
     def drift(self) -> sp.Matrix:
@@ -232,7 +235,7 @@ class FilterModel:
     @property
     def transition(self) -> sp.Matrix:
         """Phi, the sum of F^j T^j/j! to the order."""
-        return self._step.transition
+        return self._step.transition.as_immutable()
 
     @cached_property
     def forcing(self) -> sp.Matrix:
@@ -248,10 +251,12 @@ class FilterModel:
         gamma, weights = self._step.gamma, self._step.weights
         Q = _rounded(multiply(gamma * sp.diag(*weights), gamma.T)) if weights else sp.zeros(len(self.x))
         if not self.is_constant:
-            return Q
+            return Q.as_immutable()
         # What is below the part that the series leaves out is none.
         least = sp.Rational(1, 10**60)
-        return sp.Matrix(*Q.shape, lambda i, j: Q[i, j] if Q[i, j] ** 2 > least * Q[i, i] * Q[j, j] else 0)
+        return sp.ImmutableMatrix(
+            *Q.shape, lambda i, j: Q[i, j] if Q[i, j] ** 2 > least * Q[i, i] * Q[j, j] else 0
+        )
 
     @cached_property
     def observability(self) -> Observability:

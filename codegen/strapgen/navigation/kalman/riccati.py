@@ -7,6 +7,7 @@ recursion itself, in intervals around the result, proves what remains.
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cache
@@ -15,6 +16,7 @@ from typing import Any
 import mpmath
 
 from strapgen.ir.exceptions import InputError
+from strapgen.ir.read_only import ReadOnly
 from strapgen.navigation.kalman.kalman_model import FilterModel, combination, lasting, unseen
 
 _DIGITS, _MOST_DOUBLINGS = 70, 60
@@ -27,10 +29,10 @@ Rows = list[list[Any]]
 
 
 @dataclass(frozen=True)
-class Gains:
+class Gains(ReadOnly):
     """Gains by the measurement, a row for each of its updates, one row if they are steady."""
 
-    rows: dict[str, list[list[Fraction]]]
+    rows: Mapping[str, Sequence[Sequence[Fraction]]]
     #: Standard deviation of every state after the last step, or in the steady state after a measurement
     deviations: tuple[Fraction, ...]
     #: Largest change of the steady covariance by a step, by the deviations, proved in intervals; None for a schedule
