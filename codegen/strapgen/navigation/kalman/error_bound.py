@@ -46,10 +46,11 @@ def run_bound(model: KalmanFilter, interfaces: list[Interface]) -> RunBound | No
     """
     loop = _Loop(model, interfaces)
     if model.text.kind == "steady":
-        errors, steps = loop.steady(), None
+        with np.errstate(over="ignore", invalid="ignore"):  # what is not finite is no bound
+            errors, steps = loop.steady(), None
     else:
         errors, steps = loop.scheduled(), model.text.steps
-    if errors is None:
+    if errors is None or not np.isfinite(errors).all():
         return None
     return RunBound(steps, {name: float(error) for name, error in zip(model.states, errors, strict=True)})
 
@@ -127,7 +128,7 @@ class _Loop:
             power = loop @ power
             left = float((np.abs(power) @ total / total).max())
             part = float((lost / added).max())  # of a disturbance like r, what rounding lost is at most this
-            if part > _FORGOTTEN:
+            if not part <= _FORGOTTEN:  # nan is refused
                 return None
             if left < _FORGOTTEN:
                 whole = total / (1 - left) / (1 - part) * (1 + _FORGOTTEN * _FORGOTTEN)

@@ -82,7 +82,7 @@ def kalman(
         sources = model.sources(target, settings)
     place = replace(output, out=out)
     place.require_language(target)
-    command = f"{model.text.command} --target {target}" + (f" --form {form}" if form else "")
+    command = f"{model.text.command} --target {target}"
     if settings is not None:
         command += f" --word {settings.word} --rounding {settings.rounding}"
     code = {name: text for one in sources for name, text in one.step_files.items()}

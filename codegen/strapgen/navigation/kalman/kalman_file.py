@@ -26,6 +26,8 @@ from strapgen.targets.names import PYTHON, C
 
 #: Most states, measurements, inputs and steps of a filter.
 MOST_STATES, MOST_STEPS = 32, 100_000
+#: Least magnitude of a number that is not 0, and the inverse of the largest.
+_LEAST = sp.Rational(1, 10**60)
 _NAME = Key(
     "Name; all names of the file are different",
     pattern="(?!.*__)[a-z][a-z0-9_]{0,30}(?<!_)",
@@ -177,18 +179,16 @@ class FilterText(ReadOnly):
     order: int
 
 
-def read(path: str | Path, form: str | None = None) -> FilterText:
-    """Read the file of a Kalman filter; a form takes the place of that in the file."""
+def read(path: str | Path) -> FilterText:
+    """Read the file of a Kalman filter."""
     place = checks.path("path", path)
     stem = "kalman" if place == streams.STANDARD else place.stem
     name = re.sub(r"[^a-z0-9]+", "_", stem.lower()).strip("_")
     command = f"strapgen kalman {shlex.quote(place.as_posix())}"
-    return KALMAN.convert(path, lambda file: described(file, name, form, command))
+    return KALMAN.convert(path, lambda file: described(file, name, command))
 
 
-def described(
-    file: KalmanFile, name: str, form: str | None = None, command: str = "strapgen kalman"
-) -> FilterText:
+def described(file: KalmanFile, name: str, command: str = "strapgen kalman") -> FilterText:
     """Return the filter that a file describes."""
     name = file.name or parse(Annotated[str, _NAME], name, "name")
     measured = [one.name for one in file.measurement]
@@ -227,7 +227,7 @@ def described(
         interval,
         steps,
         schedule.kind,
-        checks.choice("form", form, FORMS) if form else schedule.form,
+        schedule.form,
         schedule.order,
     )
 
@@ -273,10 +273,18 @@ class _Terms:
 
 def _rational(where: str, value: sp.Expr) -> sp.Rational:
     if value.is_Rational:
+        _check_size(where, value)
         return value
     if not value.is_real or not value.is_finite:
         raise InputError(f"{where} is no real number")
-    return sp.Rational(str(sp.N(value, DIGITS)))
+    number = sp.N(value, DIGITS)
+    _check_size(where, number)
+    return sp.Rational(str(number))
+
+
+def _check_size(where: str, number: sp.Expr) -> None:
+    if number != 0 and not _LEAST <= abs(number) <= 1 / _LEAST:
+        raise InputError(f"{where} has a magnitude outside 1e-60 to 1e60")
 
 
 def _check_names(names: Sequence[str]) -> None:

@@ -54,11 +54,23 @@ def kalman(path: str | Path, form: str | None = None) -> KalmanFilter:
     >>> model.states, model.observability.rank
     (('tilt_north', 'tilt_east', 'azimuth'), 3)
     """
-    text = kalman_file.read(path, form)
+    text = kalman_file.read(path)
     try:
-        return KalmanFilter(text)
+        return KalmanFilter(_in_form(text, form))
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
+
+
+def _in_form(text: kalman_file.FilterText, form: str | None) -> kalman_file.FilterText:
+    """Return the text of a filter in another form, which its command then names."""
+    if form is None:
+        return text
+    checks.choice("form", form, FORMS)
+    if text.kind != "online":
+        raise InputError(f"form is {form!r}; it goes with online gains, and not with {text.kind} ones")
+    if form == text.form:
+        return text
+    return replace(text, form=form, command=f"{text.command} --form {form}")
 
 
 class KalmanFilter(FilterModel):
@@ -142,10 +154,8 @@ class KalmanFilter(FilterModel):
 
     def with_form(self, form: str | None) -> KalmanFilter:
         """Return the filter with another form of its covariance."""
-        if form is None or form == self.text.form:
-            return self
-        checks.choice("form", form, FORMS)
-        return KalmanFilter(replace(self.text, form=form))
+        text = _in_form(self.text, form)
+        return self if text is self.text else KalmanFilter(text)
 
     @cached_property
     def programs(self) -> tuple[Program, ...]:

@@ -225,7 +225,7 @@ class KalmanResult(Result):
             steps = "a run of any length" if self.bound_steps is None else f"{self.bound_steps} steps"
             yield f"errors of a run are certified for {steps} without a refused value, on the same words"
         elif self.states[0].format is not None:
-            yield "no error of a run is certified: errors last too long"
+            yield "no error of a run is certified: errors last too long, or a bound of them in double does not hold"
 
     def _columns(self) -> list[str]:
         """Return the columns of the states in which something stands."""

@@ -24,6 +24,9 @@ _DIGITS, _MOST_DOUBLINGS = 70, 60
 _NO_VARIANCE = Fraction(1, 10**40)
 #: Part of the covariance that a doubling may still change once it has converged.
 _CONVERGED = Fraction(1, 10**50)
+#: Largest part of the steady covariance that a period of measurements may change, and the digits to prove it in turn,
+#: since intervals widen in every step of a long period.
+_STEADY, _PROOF_DIGITS = Fraction(1, 10**30), (70, 280, 1120)
 
 Rows = list[list[Any]]
 
@@ -135,7 +138,14 @@ def steady(model: FilterModel) -> Gains:
         P, gain, _ = recursion.update(place, P)
         gains.append([_fraction(number) for number in gain])
     rows = {one.name: [gain] for one, gain in zip(text.measurements, gains, strict=True)}
-    return Gains(rows, _deviations(P), _residual(model, before))
+    for digits in _PROOF_DIGITS:
+        if (residual := _residual(model, before, digits)) <= _STEADY:
+            return Gains(rows, _deviations(P), residual)
+    first = text.measurements[0]
+    raise InputError(
+        f"measurement[{first.name}].every is {first.every}; over so many steps the steady gain is not proved to 30 "
+        "digits, and fewer are needed"
+    )
 
 
 def _require_steady(model: FilterModel) -> None:
@@ -194,11 +204,11 @@ def _doubled(model: FilterModel, recursion: _Recursion, context: Any) -> Any:
     raise InputError("the Riccati equation does not converge to a steady gain")
 
 
-def _residual(model: FilterModel, before: Rows) -> Fraction:
+def _residual(model: FilterModel, before: Rows, digits: int) -> Fraction:
     """Return a bound of the change of a covariance over a period of measurements, by the deviations, in intervals."""
     from mpmath import iv
 
-    digits, iv.dps = iv.dps, _DIGITS
+    others, iv.dps = iv.dps, digits
     try:
         recursion = _Recursion(model, iv.mpf)
         P: Rows = [[iv.mpf(entry) for entry in row] for row in before]
@@ -215,7 +225,7 @@ def _residual(model: FilterModel, before: Rows) -> Fraction:
                     worst = max(worst, _raw(part._mpi_[1]))
         return worst
     finally:
-        iv.dps = digits
+        iv.dps = others
 
 
 def _matrix_rows(matrix: Any) -> Rows:
