@@ -368,7 +368,7 @@ def main() -> None:
         parser.error(str(error))
     inside = np.mean(np.abs(flight.errors) < QUANTILE * flight.deviations, axis=(0, 1))
     print(
-        f"{flight.title}, {options.runs} runs: rms errors at the end, deviation by the filter, share in the band of 95 %"
+        f"{flight.title}, {options.runs} runs: rms errors at the end, deviation by the filter, share in the 95 % band"
     )
     for row, state in enumerate(flight.states):
         error, deviation = np.sqrt(np.mean(flight.errors[:, -1, row] ** 2)), flight.deviations[0, -1, row]
