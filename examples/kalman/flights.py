@@ -358,16 +358,20 @@ def main() -> None:
     parser.add_argument("--backend", default="c")
     parser.add_argument("--plot", type=Path)
     options = parser.parse_args()
+    if options.runs < 1:
+        parser.error(f"--runs is {options.runs}; at least 1 is needed")
     try:
+        if options.plot is not None:
+            figures.require_kind(options.plot)
         flight = fly(options.name, Case(options.runs, options.backend))
     except strapgen.InputError as error:
         parser.error(str(error))
     inside = np.mean(np.abs(flight.errors) < QUANTILE * flight.deviations, axis=(0, 1))
     print(
-        f"{flight.title}, {options.runs} runs: errors at the end, deviation by the filter, share in the band of 95 %"
+        f"{flight.title}, {options.runs} runs: rms errors at the end, deviation by the filter, share in the 95 % band"
     )
     for row, state in enumerate(flight.states):
-        error, deviation = flight.errors[:, -1, row].std(), flight.deviations[0, -1, row]
+        error, deviation = np.sqrt(np.mean(flight.errors[:, -1, row] ** 2)), flight.deviations[0, -1, row]
         print(f"  {state:16} {error:10.4g} {deviation:10.4g} {100 * inside[row]:6.1f} %")
     if options.plot is not None:
         draw(options.name, flight, options.plot)

@@ -367,7 +367,7 @@ def test_fixed_point_has_its_options_in_the_command(run, tmp_path):
     )
     # The command of the header writes the same files.
     again = command_of(header).removeprefix("strapgen ")
-    assert run(f"{again} --out out --check")[:2] == (0, "")
+    assert run(f"{again} --out out --check")[:2] == (0, "out: 8 files, in step\n")
     status, said, warned = run("window generate window-3-3 --carry full --out other")
     assert (status, said) == (2, "")
     assert "c-fixed" in warned

@@ -140,6 +140,7 @@ def test_a_class_in_python_that_holds_its_attitude(folder, kept, cause):
     [
         ("Filter.returned", None, "", None),
         ("Unmade.returned", None, "make", None),
+        ("Unmade.returned", None, "Unmade('none')", None),
         ("Four.update", None, "", causes.ABSENT),
         ("Filter.by_keyword", "rates, dt -> self.attitude", "", None),
         ("Filter.update", None, "", None),
@@ -208,7 +209,8 @@ REFUSED = {
     "wrong:raise": "has no raise (did you mean raises?); it has raises, short",
     "wrong:value": "value is no function; a method of a class is named Class.method",
     "wrong:Needs": "Needs is no function; a method of a class is named Class.method",
-    "wrong:Needs.update": "--init NAME is a function of the module that makes the object",
+    "wrong:Needs.update": "--init states its arguments, as in Needs(0.01), or a function of the module that makes",
+    "wrong:Needs.update --init 'Needs(gain)'": "--init Needs(gain): the arguments of a call are numbers or texts",
     "wrong:short": "short gives an array of the shape [3]; 4 numbers are needed",
     "wrong:words": "words gives a str; 4 numbers are needed",
     "wrong:nothing": "nothing returns None; where it leaves the attitude stands behind the arrow of --arguments",

@@ -328,6 +328,26 @@ def test_a_kernel_has_the_transfer_function(name, rng):
 
 
 @pytest.mark.parametrize("name", [*PRINTED, "cascade"])
+def test_delays_are_the_phases_of_slow_changes(name):
+    one, slow = described(name), 1e-5
+    for response, delay in ((one.analog, one.analog_delay_s), (one.digital, one.digital_delay_s)):
+        phase = np.angle(response(slow) / response(0))
+        assert math.isclose(-phase / (2 * math.pi * slow), delay, rel_tol=1e-5, abs_tol=1e-9)
+
+
+@pytest.mark.parametrize("name", [*PRINTED, "cascade"])
+def test_ranges_have_room_for_rounding(name):
+    one = described(name)
+    inputs = kernel(Choice("filter", layout=one)).inputs[: len(one.states)]
+    parts = [
+        signal.bound / (one.range * most)
+        for signal, most in zip(inputs, bounds(one.sections).states, strict=True)
+    ]
+    # 17/16, rounded upwards to nine or ten bits
+    assert all(Fraction(17, 16) <= part < Fraction(17, 16) * (1 + Fraction(1, 256)) for part in parts)
+
+
+@pytest.mark.parametrize("name", [*PRINTED, "cascade"])
 def test_words_of_16_bits_hold_every_coefficient(name):
     fixed = strapgen.quantize(
         strapgen.lower(strapgen.derive("filter", layout=FILES / f"{name}.toml")), Settings(16)

@@ -448,6 +448,42 @@ def test_a_bound_counts_every_call():
     assert expected <= bound.errors["bias"] * (1 + 1e-12) < expected * 1.001
 
 
+DECAY = """
+name = "decay"
+title = "A random walk, and a warm-up that decays"
+[[state]]
+name = "level"
+unit = "m"
+derivative = "walk"
+deviation = 10
+[[state]]
+name = "warmup"
+unit = "m"
+derivative = "-warmup/60"
+deviation = 1
+[[measurement]]
+name = "gauge"
+unit = "m"
+expression = "level + warmup"
+deviation = 0.5
+[noise.walk]
+density = 0.1
+[schedule]
+interval = 1
+kind = "online"
+"""
+
+
+@pytest.mark.parametrize("backend", ["c", "c-float", "numpy"])
+def test_a_state_that_decays_to_nothing_leaves_factors_finite(backend):
+    # Its variance is below 2^-120 after 2500 s, and flushed to zero in float after 3100 s.
+    measured = {"gauge": np.ones(3500 if backend == "numpy" else 25000)}
+    made = filter_of(DECAY).run(measured, backend=backend, form="ud")
+    level = filter_of(DECAY).run(measured, backend="c", form="joseph").covariances[-1, 0, 0]
+    assert np.isfinite(made.states).all()
+    np.testing.assert_allclose(made.covariances[-1], [[level, 0], [0, 0]], rtol=1e-5, atol=1e-30)
+
+
 @pytest.mark.parametrize("backend", cases(name for name, entry in BACKENDS.items() if name != "exact"))
 @pytest.mark.parametrize("kind", ["joseph", "ud", "steady", "scheduled"])
 def test_every_kernel_runs_on_every_target(kind, backend):
@@ -572,6 +608,7 @@ BAD = [
         "the name 'sin' has a meaning in formulas or code; another name is needed",
     ),
     ('name = "azimuth"', 'name = "gain_x"', "the name 'gain_x' has a meaning in formulas or code"),
+    ('name = "force_north"', 'name = "time"', "the measurement name 'time' is that of the time update"),
     (
         'name = "azimuth"',
         'name = "Azimuth"',

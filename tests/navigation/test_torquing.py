@@ -99,6 +99,8 @@ def test_other_constants_miss_the_printed_figures(changes, missed, value):
 def test_a_constant_that_cannot_be_is_refused():
     with pytest.raises(InputError, match="gain is 2; at most 1 is allowed"):
         TorqueLoop(gain=2)
+    with pytest.raises(InputError, match=r"asymmetry_ppm is 2e\+06; at most 1e6 is allowed"):
+        TorqueLoop(asymmetry_ppm=2e6)
     with pytest.raises(InputError, match="lag_s is 0; a number above 0 is needed"):
         TorqueLoop(lag_s=0)
     with pytest.raises(InputError, match="the loop is unstable: a pole of its linear form has the magnitude"):

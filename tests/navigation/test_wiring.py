@@ -17,7 +17,6 @@ import strapgen
 from strapgen.catalogue import choose
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.signals import ANY, FRAMES
-from strapgen.navigation.navigation_kernels import SAMPLING
 from strapgen.navigation.systems.system import Push
 from strapgen.navigation.systems.system_file import parsed, read
 from strapgen.navigation.systems.system_runner import system_runner
@@ -220,7 +219,7 @@ def test_a_sum_begins_anew_and_is_a_value_at_an_instant_while_increments_are_not
 
 
 @pytest.mark.parametrize(
-    "name", [name if name == "sum-3" else pytest.param(name, marks=pytest.mark.long) for name in SAMPLING]
+    "name", [name if name == "sum-3" else pytest.param(name, marks=pytest.mark.long) for name in RANGES]
 )
 def test_every_back_end_stays_within_its_bound(name, backend_name, rng):
     choice = choose(name, constants=CONSTANTS.get(name))

@@ -306,7 +306,7 @@ def study_output_filter(
 
     Example: strapgen study output-filter --cutoff-hz 8 --sample-hz 100
 
-    Example: strapgen study output-filter examples/filters/roll-notch.toml --frequency-hz 1,9.5,15
+    Example: strapgen study output-filter --cutoff-hz 8 --sample-hz 100
     """
     output.check(file)
     from strapgen.navigation.filters import filter_study as experiment

@@ -61,6 +61,8 @@ class TorqueLoop:
             value = getattr(self, one.name)
             if not 0 < value < math.inf:
                 raise InputError(f"{one.name} is {value:g}; a number above 0 is needed")
+        if self.asymmetry_ppm > 1e6:
+            raise InputError(f"asymmetry_ppm is {self.asymmetry_ppm:g}; at most 1e6 is allowed")
         for name in ("gain", "lag_gain", "lag_pole", "integral_gain", "leak"):
             if getattr(self, name) > 1:
                 raise InputError(f"{name} is {getattr(self, name):g}; at most 1 is allowed")

@@ -267,11 +267,11 @@ def _takes_rotation(function: Any, plan: dict[str, Any]) -> Any:
 
 def _begin(plan: dict[str, Any], module: Any, owner: Any, identity: Any) -> tuple[Any, Any]:
     """Begin a run: return the state, and the object whose method is called."""
-    init = plan["init"]
-    if not init:
+    if not plan["init"]:
         return identity, (module if owner is None else _made(owner))
+    init, arguments = _stated(plan["init"])
     if hasattr(module, init):
-        made = getattr(module, init)()
+        made = getattr(module, init)(*arguments)
         if owner is not None:
             return identity, (_made(owner) if made is None else made)
         return (
@@ -280,8 +280,23 @@ def _begin(plan: dict[str, Any], module: Any, owner: Any, identity: Any) -> tupl
     target = _made(owner) if owner is not None else None
     if target is None or not hasattr(target, init):
         raise _RefusedError(f"--init {init}: {plan['module']} has no function {init}")
-    getattr(target, init)()
+    getattr(target, init)(*arguments)
     return identity, target
+
+
+def _stated(init: str) -> tuple[str, tuple[Any, ...]]:
+    """Return the name and the arguments of a call, or of a name alone.
+
+    >>> _stated("Filter(0.01, 'fast')"), _stated("reset")
+    (('Filter', (0.01, 'fast')), ('reset', ()))
+    """
+    name, _, rest = init.partition("(")
+    try:
+        return name, ast.literal_eval(f"({rest[:-1]},)") if rest[:-1].strip() else ()
+    except (SyntaxError, ValueError):
+        raise _RefusedError(
+            f"--init {init}: the arguments of a call are numbers or texts, as in Filter(0.01)"
+        ) from None
 
 
 def _made(owner: Any) -> Any:
@@ -289,8 +304,10 @@ def _made(owner: Any) -> Any:
     try:
         return owner()
     except TypeError as error:
+        name = owner.__name__
         raise _RefusedError(
-            f"{owner.__name__}() raises {_said(error)}; --init NAME is a function of the module that makes the object"
+            f"{name}() raises {_said(error)}; --init states its arguments, as in {name}(0.01), or a function of the "
+            "module that makes the object"
         ) from error
 
 

@@ -195,6 +195,8 @@ def described(file: KalmanFile, name: str, command: str = "strapgen kalman") -> 
     signals = [one.name for rows in (file.input, file.state) for one in rows]
     _check_names([*file.parameters, *file.noise, *signals])
     _check_names(measured)
+    if "time" in measured:
+        raise InputError("the measurement name 'time' is that of the time update; another name is needed")
     _check_names([name])
     terms = _Terms({name: sp.Symbol(name, real=True) for name in signals})
     for key, text in file.parameters.items():

@@ -222,6 +222,10 @@ class _Joseph(_Builder):
         return self.corrected(K, S, upper)
 
 
+#: What a smaller element of D counts as where a column is divided by it: that of a state that decays becomes zero.
+LEAST_D = sp.Rational(1, 1 << 120)
+
+
 class _Factors(_Builder):
     """Covariance as U D U', D on the diagonal of the triangle."""
 
@@ -247,7 +251,9 @@ class _Factors(_Builder):
                 for c, (w, a) in enumerate(zip(weights, rows[j], strict=True))
             ]
             upper[j, j] = self.build.value(f"D_{j + 1}", dot(rows[j], weighted))
-            inverse = self.build.value(f"inverse_D_{j + 1}", 1 / upper[j, j]) if j else None
+            if j:
+                limited = self.build.value(f"limited_D_{j + 1}", sp.Max(upper[j, j], LEAST_D))
+                inverse = self.build.value(f"inverse_D_{j + 1}", 1 / limited)
             for i in range(j):
                 upper[i, j] = self.named(f"U_{i + 1}_{j + 1}", dot(rows[i], weighted) * inverse)
                 rows[i] = [

@@ -446,7 +446,10 @@ def median_of_three() -> Kernel:
         "median-3",
         "Median of three units",
         f"{FENNER}: three units named, median derived",
-        notes=("Of angles that turn, the differences from one of the units.",),
+        notes=(
+            "Of angles that turn, the differences from one of the units.",
+            "A unit that sends no finite number is to be left out before: in floating point it may pass as the median.",
+        ),
     )
 
 
