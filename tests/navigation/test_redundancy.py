@@ -534,7 +534,13 @@ def test_a_geometry_becomes_code_and_tables(tmp_path, monkeypatch, capsys):
     lines = Path("out/skew_tables.csv").read_text().splitlines()
     assert lines[0] == "removed,equations,status,failed,triad,points"
     assert len(lines) == 1 + sum(len(table["verdicts"]) for table in data["tables"])
-    said = run("redundancy skew.toml --target c --out out", capsys)  # other names: all are new but the tables
+    again = "redundancy skew.toml --target c-fixed --word 16 --out out --check"
+    assert "in step" in run(again, capsys)
+    (tmp_path / "out" / "skew_tables.csv").write_text("changed\n")
+    assert "out is out of step" in run(again, capsys, 1)
+    said = run(
+        "redundancy skew.toml --target c --force --out out", capsys
+    )  # other names: all are new but the tables
     assert "no failure is isolated, whichever sensors fail; one more is detected" in said
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -21,7 +22,7 @@ if TYPE_CHECKING:
 
 
 @grouped
-@rules(Needs("--force", "--out"))
+@rules(Needs("--check --force", "--out"))
 def redundancy(
     file: Annotated[
         Path,
@@ -42,7 +43,7 @@ def redundancy(
     ] = "c",
     fixed: Annotated[FixedOptions, Shown(only=("word", "rounding", "carry"))],
     out: NewFolder = None,
-    output: Annotated[SourceOptions, Shown(only=("force",))],
+    output: Annotated[SourceOptions, Shown(only=("check", "force"))],
     format: Format = "text",
 ) -> None:
     """Derive parity equations and failure isolation for sensors.
@@ -65,7 +66,11 @@ def redundancy(
     if out is not None:
         files = _sources(sensors, target, settings)
         files[f"{sensors.name}_tables.csv"] = tables_csv(sensors, tables)
-        written = SourceOptions(out=out, force=output.force).write(files)
+        output = replace(output, out=out)
+        if output.check:
+            output.show_difference(files, format)
+            return
+        written = output.write(files)
     show(GeometryResult.of(sensors, tables, written), format)
 
 
