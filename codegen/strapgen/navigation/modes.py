@@ -109,5 +109,7 @@ def mode_sequence() -> Kernel:
         "mode-sequence",
         "Sequence of the modes off, align, navigate and attitude",
         f"{FENNER}, sequences and times printed in words, recursion derived",
-        notes=("Times are counted in cycles, which every word holds exactly.",),
+        notes=(
+            "Times are counted in cycles, which every word holds exactly; one of more than 32767 takes a slower cycle.",
+        ),
     )
